@@ -108,7 +108,7 @@ class TrustLimits:
     weak_below: int = 6
     """number of used observations below which a frame is weak"""
     untied_intervals: tuple[float, float] = (0.25, 0.6)
-    """share of the intervals between frames that no used landmark is observed on both sides of"""
+    """share of the pairs of consecutive frames without a common used landmark"""
     given_up_frames: tuple[float, float] = (0.0, 0.05)
     """share of frames whose observations were dropped"""
     batch_cost: tuple[float, float] = (0.005, 0.05)
@@ -124,8 +124,9 @@ def trust(
 ) -> Trust:
     """Verdict on a reference by up to nine criteria, each with its limits: see `CRITERIA` and `TrustLimits`.
 
-    It is UNTRUSTED if it failed or used no observation, and at least DOUBTFUL if the batch solution has one start only.
-    Residuals are compared with the problem's own noise model. The two criteria on `batch` need a batch solution.
+    The worst criterion decides. A reference that failed or used no observation is UNTRUSTED. It is DOUBTFUL or worse
+    where `batch` was found from one start only. Residuals are compared with the noise model of the problem. Without a
+    `batch` solution its two criteria are left out.
     """
     if reference.status is Status.FAILED:
         return Trust(Verdict.UNTRUSTED, (f"it failed: {reference.reason}",))
@@ -189,16 +190,16 @@ def trust(
             else "",
         ),
     ]
-    beside = _beside_batch(problem, reference, batch, limit)
+    in_batch = _compared_with_batch(problem, reference, batch, limit)
     findings = [(criterion.verdict, text) for criterion, text in judged if text]
     if not problem.diagnosed:
         findings.append((Verdict.TRUSTED, "the recording was not diagnosed: its noise is assumed"))
-    findings.append((beside.verdict, beside.reason))
+    findings.append((in_batch.verdict, in_batch.reason))
     findings.sort(key=lambda finding: -finding[0])
     return Trust(
         max(verdict for verdict, _ in findings),
         tuple(text for _, text in findings),
-        (*(criterion for criterion, _ in judged), *beside.criteria),
+        (*(criterion for criterion, _ in judged), *in_batch.criteria),
     )
 
 
@@ -214,16 +215,15 @@ def _criterion(limits: TrustLimits, code: str, value: float, remark: str = "") -
     title, unit = CRITERIA[code]
     name = title.format(weak_below=limits.weak_below)
     at_least = code in AT_LEAST
-    verdict = (_below if at_least else _above)(value, (doubtful, untrusted))
+    verdict = (_verdict_below if at_least else _verdict_above)(value, (doubtful, untrusted))
     return Criterion(code, name, value, unit, doubtful, untrusted, at_least, verdict, remark)
 
 
 def expected_observations(problem: Problem) -> BoolArray:
-    """Denominator of `used_share`: mask (n,) of the problem's observations and of those that a mask excluded.
+    """Mask (n,) of the observations that count in `used_share`: those of chosen features, masked or not.
 
-    Where features were chosen, only their observations count. Excluded far points (disparity above 0, at most
-    FAR_POINT) do not count, as they determine no depth; observations without positive disparity, which are impossible,
-    do.
+    Masked far points (disparity above 0, at most FAR_POINT px) do not count, as they determine no depth. Observations
+    without positive disparity count: no point in front of the cameras has them.
     """
     d = disparity(problem.sequence.observations.pixel)
     counted = problem.of_chosen_features & ~((d > 0.0) & (d <= FAR_POINT))
@@ -238,25 +238,27 @@ def has_positive_disparity(problem: Problem) -> BoolArray:
     return np.asarray(disparity(problem.sequence.observations.pixel) > 0.0, dtype=np.bool_)
 
 
-class _BesideBatch(NamedTuple):
+class _BatchComparison(NamedTuple):
     verdict: Verdict
     reason: str
     criteria: tuple[Criterion, ...] = ()
 
 
-def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None, limit: TrustLimits) -> _BesideBatch:
-    """Whether the reference is at the minimum of the cost, over the observations that both used."""
+def _compared_with_batch(
+    problem: Problem, reference: Estimate, batch: Estimate | None, limit: TrustLimits
+) -> _BatchComparison:
+    """Cost and positions of the reference beside those of the batch solution, over the observations that both used."""
     if batch is None or batch.status is Status.FAILED:
         why = "" if batch is None else f": that failed, {batch.reason}"
-        return _BesideBatch(Verdict.TRUSTED, f"not compared with a batch solution{why}")
+        return _BatchComparison(Verdict.TRUSTED, f"not compared with a batch solution{why}")
     kinds = {event.kind for event in batch.events}
     if EventKind.ONE_START in kinds:
-        return _BesideBatch(
+        return _BatchComparison(
             Verdict.DOUBTFUL,
             "a batch solution was found from one start only: no second start confirms that it is the lowest minimum",
         )
     if batch is reference:
-        return _BesideBatch(Verdict.TRUSTED, "it is the batch solution itself")
+        return _BatchComparison(Verdict.TRUSTED, "it is the batch solution itself")
     both = reference.used & batch.used
     excess = cost(problem, reference, both) / cost(problem, batch, both) - 1.0
     apart = reference.world_T_imu[:, :3, 3] - batch.world_T_imu[:, :3, 3]
@@ -275,14 +277,14 @@ def _beside_batch(problem: Problem, reference: Estimate, batch: Estimate | None,
     cost_gap = f"{per_cent(abs(excess))} {side} the batch's" if abs(excess) >= RESOLUTION else "the same"
     path_gap = f"{distance(rmse)} (RMSE{lengths}) away" if rmse >= RESOLUTION else "the same"
     text = f"a batch solution{start} {agrees}: the negative log-likelihood is {cost_gap}, the trajectory {path_gap}"
-    return _BesideBatch(verdict, text, criteria)
+    return _BatchComparison(verdict, text, criteria)
 
 
-def _above(value: float, limits: tuple[float, float]) -> Verdict:
+def _verdict_above(value: float, limits: tuple[float, float]) -> Verdict:
     return Verdict(int(not value <= limits[0]) + int(not value <= limits[1]))
 
 
-def _below(value: float, limits: tuple[float, float]) -> Verdict:
+def _verdict_below(value: float, limits: tuple[float, float]) -> Verdict:
     return Verdict(int(not value >= limits[0]) + int(not value >= limits[1]))
 
 

@@ -28,7 +28,7 @@ OF_THE_FILE = frozenset(
 """codes of faults of the file, which a run prints with every preset"""
 
 AS_GIVEN = "as given"
-"""the certainty of a finding that the user states"""
+"""`Finding.certainty` of a repair that the user specified"""
 
 
 MEASURES = {

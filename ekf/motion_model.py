@@ -14,6 +14,7 @@ from fgbaseline.data.problem.inertial import ImuIntervals, InertialStart
 from fgbaseline.geometry import FloatArray, se3, strapdown
 
 POSE = 6
+"""degrees of freedom of the pose: right perturbation [v, w]"""
 
 
 class BodyState(NamedTuple):
@@ -25,7 +26,7 @@ class BodyState(NamedTuple):
     """(n - 6,) components after the pose, with additive errors"""
 
     def corrected(self, delta: FloatArray) -> "BodyState":
-        """State moved by an error (n,)."""
+        """State with the correction `delta` (n,): pose exp(delta[:6]), additive + delta[6:]."""
         return BodyState(self.pose @ se3.exp_one(delta[:POSE]), self.additive + delta[POSE:])
 
 
@@ -49,15 +50,15 @@ class MotionModel(Protocol):
 
     start: BodyState
     covariance: FloatArray
-    """(n, n) of the start"""
+    """(n, n) covariance of the error of `start`"""
 
     def predict(self, k: int, body: BodyState) -> PredictedState:
-        """PredictedState of frame k + 1 from the state of frame k."""
+        """Predicts the state of frame k + 1 from that of frame k, with transition and noise."""
         ...
 
 
 class VelocityMotion:
-    """Motion by the problem's increments (equation 9): F = exp(-tau u^curly), Q = W."""
+    """Motion by the problem's increments (equation 9): F = Ad(exp(-increment)), Q = `increment_covariance`."""
 
     def __init__(self, problem: Problem) -> None:
         self.start = BodyState(problem.initial_pose, np.empty(0))
@@ -67,7 +68,7 @@ class VelocityMotion:
         self.noise = problem.increment_covariance
 
     def predict(self, k: int, body: BodyState) -> PredictedState:
-        """PredictedState of frame k + 1 from the state of frame k."""
+        """Predicts the state of frame k + 1 from that of frame k, with transition and noise."""
         return PredictedState(BodyState(body.pose @ self.step[k], body.additive), self.transition[k], self.noise[k])
 
 
@@ -80,7 +81,7 @@ class InertialMotion:
         self.covariance = start.covariance
 
     def predict(self, k: int, body: BodyState) -> PredictedState:
-        """PredictedState of frame k + 1 from the state of frame k."""
+        """Predicts the state of frame k + 1 from that of frame k, with transition and noise."""
         velocity, biases = body.additive[:3], body.additive[3:]
         motion = self.imu.motion(k, biases[:3], biases[3:])
         pose, velocity = strapdown.predict(body.pose, velocity, motion, self.imu.gravity_vector)
@@ -110,7 +111,10 @@ class BodyHistory:
         self.pose[k], self.additive[k], self.covariance[k] = body.pose, body.additive, covariance
 
     def fields(self) -> dict[str, Any]:
-        """Fields of the `Estimate`: poses and covariances; with inertial samples velocity, biases and all 15 x 15."""
+        """Keywords of `Estimate`: poses and their covariances (T, 6, 6).
+
+        With inertial samples also velocity, biases, and the covariance (T, 15, 15) of the whole body state.
+        """
         fields: dict[str, Any] = {
             "world_T_imu": self.pose,
             "covariance": np.ascontiguousarray(self.covariance[:, :POSE, :POSE]),

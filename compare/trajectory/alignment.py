@@ -19,7 +19,7 @@ class Align(StrEnum):
 
     NONE = "none"
     FIRST_POSE = "first-pose"
-    """the transformation that maps its first pose to the reference's"""
+    """the transformation that maps the first pose of the estimate to that of the reference"""
     YAW = "yaw"
     """rotation about up and translation, the unobservable directions of visual-inertial estimation"""
     SE3 = "se3"
@@ -29,7 +29,7 @@ class Align(StrEnum):
 
 _CAPTIONS = {
     Align.NONE: "not aligned",
-    Align.FIRST_POSE: "the first pose put on the reference's",
+    Align.FIRST_POSE: "aligned at the first pose",
     Align.YAW: "yaw and position aligned",
     Align.SE3: "SE(3)-aligned",
     Align.SIM3: "Sim(3)-aligned",
@@ -54,7 +54,7 @@ class Alignment(Displayed):
     of: int = 0
     """number of pose pairs available"""
     free: tuple[str, ...] = ()
-    """directions that the positions leave undetermined: orientations then determine rotations, and the scale is 1"""
+    """what the positions leave undetermined: orientations determine such a rotation, such a scale is 1"""
 
     @property
     def matrix(self) -> FloatArray:
@@ -81,14 +81,14 @@ class Alignment(Displayed):
     @property
     def caption(self) -> str:
         """Alignment for a table's caption: 'SE(3)-aligned over all 120 poses'."""
-        said = self.method
+        text = self.method
         if self.kind in (Align.YAW, Align.SE3, Align.SIM3):
-            said += f" over {'all' if self.n == self.of else 'the first'} {plural(self.n, 'pose')}"
+            text += f" over {'all' if self.n == self.of else 'the first'} {plural(self.n, 'pose')}"
         if self.kind is Align.SIM3:
-            said += f" (scale {self.scale:.6g})"
+            text += f" (scale {self.scale:.6g})"
         if self.free:
-            said += f"; their positions leave {' and '.join(self.free)} open"
-        return said
+            text += f"; their positions leave {' and '.join(self.free)} open"
+        return text
 
 
 def align(
@@ -102,10 +102,12 @@ def align(
     """Transformation of this kind that aligns paired positions of poses (n, 4, 4) to the reference's (n, 4, 4).
 
     Least squares in closed form (Umeyama, 1991; for yaw Zhang and Scaramuzza, 2018), never a reflection, over the
-    `first` pairs or all. Where the positions leave directions open (a straight line, standing still, a mirror image),
-    the equally good transformation that brings the orientations nearest to the reference's is taken, which is
-    independent of the frame. `up` (3,) is up in the reference's world, for yaw. Raises InputError for a kind that does
-    not exist or a `first` that is not between 1 and n, and FgbaselineError where there are no pairs.
+    `first` pairs or all; m. `up` (3,) points up in the reference's world, for yaw.
+
+    Positions on a line, in one point or in a plane may leave a rotation undetermined. Of the equally good ones, that
+    whose orientations are nearest to the reference's is taken, in whatever frame the trajectories are given.
+
+    Raises InputError for an unknown kind or a `first` that is not between 1 and n, and FgbaselineError without pairs.
     """
     try:
         kind = Align(kind)
@@ -120,15 +122,15 @@ def align(
     if kind is Align.NONE:
         return Alignment(n=0, of=n)
     used = 1 if kind is Align.FIRST_POSE else (first or n)
-    there, here = estimate[:used], reference[:used]
+    source, target = estimate[:used], reference[:used]
 
     def orientation_moment() -> FloatArray:
-        return _side_by_side(here) @ _side_by_side(there).T
+        return _side_by_side(target) @ _side_by_side(source).T
 
     if kind is Align.FIRST_POSE:
         R = orientation_moment()
-        return Alignment(kind, R, here[0, :3, 3] - R @ there[0, :3, 3], 1.0, 1, n)
-    return _fitted(there[:, :3, 3], here[:, :3, 3], orientation_moment, kind, np.asarray(up, dtype=np.float64), n)
+        return Alignment(kind, R, target[0, :3, 3] - R @ source[0, :3, 3], 1.0, 1, n)
+    return _fitted(source[:, :3, 3], target[:, :3, 3], orientation_moment, kind, np.asarray(up, dtype=np.float64), n)
 
 
 def _side_by_side(poses: FloatArray) -> FloatArray:
@@ -137,19 +139,23 @@ def _side_by_side(poses: FloatArray) -> FloatArray:
 
 
 def _fitted(
-    there: FloatArray,
-    here: FloatArray,
+    source: FloatArray,
+    target: FloatArray,
     orientation_moment: Callable[[], FloatArray],
     kind: Align,
     up: FloatArray,
     n: int,
 ) -> Alignment:
-    there, here = np.ascontiguousarray(there), np.ascontiguousarray(here)
-    center, goal = there.mean(axis=0), here.mean(axis=0)
-    x, y = there - center, here - goal
+    """Least-squares alignment of positions `source` (m, 3) to `target` (m, 3), of n available pairs.
+
+    `orientation_moment` gives the sum of R_target R_source^T, which decides where positions do not.
+    """
+    source, target = np.ascontiguousarray(source), np.ascontiguousarray(target)
+    center, goal = source.mean(axis=0), target.mean(axis=0)
+    x, y = source - center, target - goal
     M = y.T @ x
-    # Rounding of a square that should be zero: positions far from the origin keep fewer digits.
-    rounding = 8 * np.finfo(np.float64).eps * (np.abs(there).max() + np.abs(here).max()) * len(x)
+    # Bound of the rounding error of M: positions far from the origin keep fewer digits.
+    rounding = 8 * np.finfo(np.float64).eps * (np.abs(source).max() + np.abs(target).max()) * len(x)
     floor = rounding * max(float(np.abs(x).max()), float(np.abs(y).max())) + np.finfo(np.float64).tiny
     free: tuple[str, ...]
     if kind is Align.YAW:

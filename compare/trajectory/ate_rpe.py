@@ -1,6 +1,7 @@
 """Absolute trajectory error (ATE) and relative pose error (RPE) (Sturm et al., 2012).
 
-E = A^-1 B takes one pose, or one motion, to another. `PoseRelation` names what of E is measured, as in evo.
+Both measure E = A^-1 B: for ATE A and B are a pose of the reference and of the estimate, for RPE motions between two
+poses. `PoseRelation` names the scalar measure of E, as in evo.
 """
 
 from enum import StrEnum
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class PoseRelation(StrEnum):
-    """Scalar measure of E = A^-1 B, which takes one pose (or motion) A to the other B."""
+    """Scalar measure of E = A^-1 B, the difference between two poses (ATE) or two motions (RPE)."""
 
     TRANSLATION = "translation"
     """norm of the translation of E, m"""
@@ -40,11 +41,13 @@ class PoseRelation(StrEnum):
 
 
 def absolute_pose_error(estimate: FloatArray, reference: FloatArray, what: PoseRelation | str) -> FloatArray:
-    """Error (n,) of poses (n, 4, 4) against reference poses (n, 4, 4).
+    """Errors (n,) of poses (n, 4, 4) against reference poses (n, 4, 4), in the unit of `what`.
 
-    Norms are invariant to a common rotation, so only angles need E itself.
+    Raises InputError for the measures that only motions have, `distance` and `distance_percent`.
     """
     what = PoseRelation(what)
+    if what in (PoseRelation.DISTANCE, PoseRelation.DISTANCE_PERCENT):
+        raise InputError(f"{what}: a measure of motions; a pose has {', '.join(POSE_COLUMNS)} or rotation")
     apart = estimate[:, :3, 3] - reference[:, :3, 3]
     return _measured(apart, estimate[:, :3, :3], reference[:, :3, :3], what)
 
@@ -52,7 +55,7 @@ def absolute_pose_error(estimate: FloatArray, reference: FloatArray, what: PoseR
 def relative_pose_error(
     estimate: FloatArray, reference: FloatArray, pairs: IntArray, what: PoseRelation | str
 ) -> FloatArray:
-    """Error (m,) of the motions between pairs (m, 2) of poses (n, 4, 4) against the reference's (n, 4, 4)."""
+    """Errors (m,) of motions between pairs (m, 2) of poses (n, 4, 4) against the reference's; unit: that of `what`."""
     what = PoseRelation(what)
     i, j = pairs[:, 0], pairs[:, 1]
     steps = [poses[j, :3, 3] - poses[i, :3, 3] for poses in (estimate, reference)]
@@ -71,8 +74,9 @@ def relative_pose_error(
 
 
 def _measured(apart: FloatArray, R: FloatArray, R_ref: FloatArray, what: PoseRelation) -> FloatArray:
+    # Norms are invariant to a common rotation, so only the angle needs E itself.
     squared = np.einsum("ti,ti->t", apart, apart)
-    if what in (PoseRelation.TRANSLATION, PoseRelation.DISTANCE):
+    if what is PoseRelation.TRANSLATION:
         return np.asarray(np.sqrt(squared))
     if what in (PoseRelation.ROTATION, PoseRelation.ROTATION_DEG):
         angle = so3.rotation_angle(np.swapaxes(R_ref, 1, 2) @ R)
@@ -80,9 +84,7 @@ def _measured(apart: FloatArray, R: FloatArray, R_ref: FloatArray, what: PoseRel
     chord = np.einsum("tij,tij->t", R - R_ref, R - R_ref)
     if what is PoseRelation.ROTATION_CHORD:
         return np.asarray(np.sqrt(chord))
-    if what is PoseRelation.POSE:
-        return np.asarray(np.sqrt(squared + chord))
-    raise ValueError(f"{what} is not one of poses, but of motions")
+    return np.asarray(np.sqrt(squared + chord))
 
 
 POSE_COLUMNS = (PoseRelation.TRANSLATION, PoseRelation.ROTATION_DEG, PoseRelation.ROTATION_CHORD, PoseRelation.POSE)
@@ -94,10 +96,10 @@ def absolute_errors(matched: MatchedTrajectories) -> "pd.DataFrame":
 
 
 def absolute_error_columns(matched: MatchedTrajectories) -> Columns:
-    """ATE: one row per pair of poses, with the reference's stamp `t` (s) and the columns of `PoseRelation`
+    """ATE as columns, a row for each pair of poses, after the alignment that `matched.caption` names.
 
-    `translation` (m; its RMSE is the ATE of Sturm et al., 2012), `rotation_deg`, `rotation_chord` and `pose`. In the
-    reference's world, after the alignment that `matched.caption` names.
+    `t` is the reference's stamp, s; `translation` (m; its RMSE is the ATE of Sturm et al., 2012), `rotation_deg`,
+    `rotation_chord` and `pose` are measures of `PoseRelation`.
     """
     estimate, reference = matched.estimate.world_T_body, matched.reference.world_T_body
     columns = {what.value: absolute_pose_error(estimate, reference, what) for what in POSE_COLUMNS}
@@ -135,11 +137,12 @@ def relative_errors(
 def relative_error_columns(
     matched: MatchedTrajectories, delta: float, unit: Unit | str, **pairing: Unpack[Pairing]
 ) -> Columns:
-    """RPE: one row per pair of poses that are `delta` apart (see `matched_pairs`), with the columns
+    """RPE as columns, a row for each pair of poses that are `delta` apart (see `matched_pairs`).
 
-    `start`, `end` (indices of the matched poses), `t` (s, of the start), `seconds` and `meters` (of the reference's
-    path) between them, and `PoseRelation` of the motion from start to end: `translation` (m, in the frame
-    of the starting body), `rotation_deg`, `rotation_chord`, `pose`, `distance` (m) and `distance_percent`.
+    `start` and `end` are indices of the matched poses, `t` is the stamp of the start, s; `seconds` and `meters` lie
+    between them on the reference's path. The others are measures of `PoseRelation` of the motion from start to end:
+    `translation` (m, in the body frame of the start), `rotation_deg`, `rotation_chord`, `pose`, `distance` (m) and
+    `distance_percent`.
     """
     reference, estimate = matched.reference, matched.estimate
     pairs = matched_pairs(matched, delta, unit, **pairing)
@@ -182,4 +185,6 @@ def require_stamps(matched: MatchedTrajectories) -> None:
     """Raises InputError where reference or estimate has no time stamps."""
     for path in (matched.reference, matched.estimate):
         if not path.stamped:
-            raise InputError(f"{path.source or path.name}: it has no time stamps, so it has no errors per second")
+            raise InputError(
+                f"{path.source or path.name}: it has no time stamps, which drift and RPE over seconds need"
+            )

@@ -7,15 +7,17 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, so3
 
 UNDETERMINED = 1e-12
-"""share of the largest singular value, below which a direction is rounding"""
+"""share of the largest singular value, below which another one is rounding error"""
 
 
 def solve_wahba(M: FloatArray, tie: Callable[[], FloatArray], floor: float) -> tuple[FloatArray, FloatArray | None]:
-    """Proper rotation R (3, 3) that maximizes trace(R^T M), M (3, 3) = sum of y x^T over vectors x rotated to y.
+    """Proper rotation R (3, 3) that maximizes trace(R^T M), with M (3, 3) the sum of y x^T over vectors x rotated to y.
 
-    Where M leaves R undetermined (singular values below `floor` or UNDETERMINED), the equally good rotation that
-    maximizes trace(R^T tie()), then trace(R), the smallest. Also returns the axis (3,) about which M leaves R
-    undetermined, in the frame of y: None where there is none, zero where all of R is undetermined.
+    M leaves R undetermined where its singular values are below `floor`, or below UNDETERMINED of the largest. `tie()`
+    (3, 3) then takes its place among the equally good rotations, and after it the smallest angle decides.
+
+    Also returns the axis (3,), in the frame of y, about which M leaves R undetermined: None if there is none, zero if
+    all of R is undetermined.
     """
     U, d, Vt = np.linalg.svd(M)
     if d[0] <= floor:
@@ -37,16 +39,16 @@ def solve_wahba_about_axis(
 
     In that case it maximizes trace(R^T tie()); it is the identity where that leaves it undetermined too.
     """
-    turn, strength = _turn(axis, M)
-    if strength > max(floor, UNDETERMINED * float(np.linalg.norm(M))):
-        return so3.exp_so3(turn * axis), False
-    turn, strength = _turn(axis, tie())
-    if strength > _floor_of(tie()):
-        return so3.exp_so3(turn * axis), True
+    angle, amplitude = _best_angle(axis, M)
+    if amplitude > max(floor, UNDETERMINED * float(np.linalg.norm(M))):
+        return so3.exp_so3(angle * axis), False
+    angle, amplitude = _best_angle(axis, tie())
+    if amplitude > _floor_of(tie()):
+        return so3.exp_so3(angle * axis), True
     return np.eye(3), True
 
 
-def _turn(axis: FloatArray, M: FloatArray) -> tuple[float, float]:
+def _best_angle(axis: FloatArray, M: FloatArray) -> tuple[float, float]:
     """Best angle, rad, and the amplitude with which trace(R^T M) depends on the angle."""
     cosine = float(np.trace(M) - axis @ M @ axis)
     sine = float(axis @ np.array([M[2, 1] - M[1, 2], M[0, 2] - M[2, 0], M[1, 0] - M[0, 1]]))

@@ -63,27 +63,29 @@ class NoiseSettings:
     """Standard deviations of the noise; defaults for recordings that could not be diagnosed."""
 
     pixel: float = 1.5
-    """px, of each of the four rows"""
+    """px, of each of uL, vL, uR, vR"""
     linear_velocity: float = 0.3
-    """m/s, of the velocity held over an interval"""
+    """m/s, of each component of the body velocity, as the mean over an interval"""
     angular_velocity: float = 0.03
-    """rad/s, of the rate held over an interval"""
+    """rad/s, of each component of the angular rate, as the mean over an interval"""
 
 
 @dataclass(frozen=True, slots=True)
 class InverseDepthPrior:
-    """A Gaussian about the inverse depths at which points of the scene are first observed, 1/m.
+    """Gaussian prior of the inverse depth of a point at its first observation, for filters with one camera.
 
-    A filter with one camera starts landmarks with it; it is no part of the cost. Smoothers wait for parallax instead.
+    It is not in the cost of the problem: smoothers defer a landmark until its parallax determines it.
     """
 
     mean: float
+    """1/m"""
     sigma: float
+    """1/m"""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class LandmarkPrior(Displayed):
-    """An independent Gaussian prior on every chosen landmark, in the world frame."""
+    """Gaussian prior of every chosen landmark, independent of the others, in the world frame."""
 
     mean: FloatArray
     """(m, 3) m, one row per chosen feature"""
@@ -93,15 +95,16 @@ class LandmarkPrior(Displayed):
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Problem(Displayed):
-    """A state estimation problem over T frames: world_T_imu of every frame and the positions of m landmarks.
+    """State estimation problem over T frames: world_T_imu of every frame and the positions of m landmarks.
 
-    With raw inertial data each frame also has a velocity and biases: `imu` takes the place of the increments, `start`
-    that of `initial_covariance`, and z of the world points up.
+    The estimate minimizes the sum of squared whitened residuals of
 
-    Minimize the sum of squared whitened residuals of the increments (right perturbation [v, w], covariance
-    `increment_covariance`; with raw inertial data of the preintegrated samples), of the observations (the rows of
-    `measurement`, three of a stereo pair and two of one camera, with `kernel` on their norm) and of `landmark_prior`,
-    with the first pose at `initial_pose` with `initial_covariance` (zero: fixed).
+    - the increments: right perturbation [v, w], covariance `increment_covariance`;
+    - the observations: rows of `measurement`, three of a stereo pair and two of one camera, `kernel` on their norm;
+    - the first pose, `initial_pose` with `initial_covariance` (zero: fixed), and `landmark_prior` if there is one.
+
+    With raw inertial data each frame also has a velocity and biases. Preintegrated samples (`imu`) take the place of
+    the increments, `start` that of `initial_covariance`, and z of the world points up.
     """
 
     preset: str
@@ -121,7 +124,7 @@ class Problem(Displayed):
     initial_pose: FloatArray
     """(4, 4) world_T_imu of frame 0"""
     initial_covariance: FloatArray
-    """(6, 6) of the right perturbation of the first pose; zero holds it"""
+    """(6, 6) of the right perturbation [v, w] of the first pose, m and rad; zero fixes the pose"""
     imu: ImuIntervals | None = None
     """samples between the frames, where the recording has raw inertial data"""
     start: InertialStart | None = None
@@ -168,9 +171,10 @@ class Problem(Displayed):
 
     @property
     def of_chosen_features(self) -> BoolArray:
-        """Mask (n,) of the sequence's observations of chosen features, excluded ones included; all without a choice.
+        """Mask (n,) of the sequence's observations of chosen features, masked ones included; all if none was left out.
 
-        An observation that another reason excludes has that reason as its code, whether or not its landmark is chosen.
+        `excluded` alone does not tell: the code of a masked observation is another one, whether or not its feature is
+        chosen.
         """
         if not (self.excluded == Excluded.FEATURE_NOT_CHOSEN).any():
             return np.ones(len(self.excluded), dtype=np.bool_)
@@ -194,10 +198,7 @@ class Problem(Displayed):
         }
 
     def to_frame(self) -> "pd.DataFrame":
-        """Table with a row for each observation of the sequence: see `Observations.to_frame`, and why it is excluded.
-
-        `excluded` is empty for the observations that are used.
-        """
+        """Table of the sequence's observations (`Observations.to_frame`), and why each is `excluded` (or empty)."""
         words = np.array(["" if e is Excluded.NO else e.name.lower().replace("_", " ") for e in Excluded])
         return self.sequence.observations.to_frame().assign(excluded=words[self.excluded])
 
@@ -213,7 +214,7 @@ class Problem(Displayed):
         return self.sequence.observations.select(self.mask)
 
     def scatter_mask(self, taken: BoolArray) -> BoolArray:
-        """Flags of `observations()` scattered over the sequence's observations (n,), as in `Estimate.used`."""
+        """Mask (n,) over the sequence's observations, as `Estimate.used` has it, from one over `observations()`."""
         scattered = self.mask
         scattered[scattered] = taken
         return scattered

@@ -9,6 +9,7 @@ from fgbaseline.data.axis_conventions import AXIS_CONVENTIONS, IDENTITY, axes_ma
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, so3
 
+from ..robust_scale import CHI_SQUARE_MEDIAN
 from .robust_regression import regress
 
 LAGS = (-2, -1, 0, 1, 2)
@@ -17,8 +18,6 @@ ENOUGH = 25.0
 """log-likelihood lead at which the data determine the convention"""
 MISALIGNMENT, LEVER_ARM, SCALE = np.deg2rad(2.0), 0.3, 0.05
 """rad, baselines and share: largest errors of a valid calibration; what they explain is no evidence for another"""
-CHI_SQUARE_MEDIAN = 0.4549
-"""median of the chi-square distribution with one degree of freedom"""
 MAX_BIAS = 1.0
 """rad/s"""
 GAIN_RANGE, GAIN_DEVIATION = 0.35, 0.12
@@ -136,7 +135,7 @@ def _excited(seen: FloatArray, x: FloatArray, rate: FloatArray, lever_arm: float
     """
     reach = np.abs(x).max(axis=0)
     power = np.maximum(np.mean(np.clip(seen, -reach, reach) * x, axis=0), 0.0)
-    turning = np.median(rate**2, axis=0) / CHI_SQUARE_MEDIAN
+    turning = np.median(rate**2, axis=0) / CHI_SQUARE_MEDIAN[1]
     leak = MISALIGNMENT**2 * (power.sum() - power) + lever_arm**2 * (turning.sum() - turning)
     return [bool(p > EXCITED**2 * q) for p, q in zip(power, leak, strict=True)]
 

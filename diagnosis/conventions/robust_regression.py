@@ -6,6 +6,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
+from ..robust_scale import MAD_TO_SIGMA
+
 TUKEY = 4.685
 """sigmas, beyond which a residual has no weight (Tukey's biweight at 95 % efficiency)"""
 ROUNDS = 8
@@ -56,4 +58,4 @@ def _bulk(residual: FloatArray) -> FloatArray:
     median = sorted_about[:, half]
     if residual.shape[1] % 2 == 0:
         median = 0.5 * (median + sorted_about[:, :half].max(axis=1))
-    return np.asarray(np.maximum(1.4826 * median, 1e-9), dtype=np.float64)
+    return np.asarray(np.maximum(MAD_TO_SIGMA * median, 1e-9), dtype=np.float64)

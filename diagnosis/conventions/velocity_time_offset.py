@@ -7,6 +7,7 @@ import numpy as np
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray
 
+from ..robust_scale import MAD_TO_SIGMA
 from .spline import Spline, spline_through
 
 MAX_SHIFT = 3.0
@@ -54,7 +55,7 @@ def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) 
     spline = spline_through(k[known], _moderate(seen, recorded, known))
     x = recorded - recorded[inside].mean(axis=0)
     residual = x[inside] - spline(k[inside])
-    sigma = np.maximum(1.4826 * np.median(np.abs(residual - np.median(residual, axis=0)), axis=0), 1e-9)
+    sigma = np.maximum(MAD_TO_SIGMA * np.median(np.abs(residual - np.median(residual, axis=0)), axis=0), 1e-9)
     weight = 1.0 / sigma**2
     shifts = np.arange(-MAX_SHIFT, MAX_SHIFT + SHIFT_STEP / 2, SHIFT_STEP)
     clipped = np.clip(x[inside], -6 * np.std(x[inside], axis=0), 6 * np.std(x[inside], axis=0))
@@ -64,7 +65,7 @@ def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) 
     peak = int(np.argmax(score))
     slope = spline(k[inside] + shifts[peak], 1)
     residual = x[inside] - spline(k[inside] + shifts[peak])
-    sigma = np.maximum(1.4826 * np.median(np.abs(residual - np.median(residual, axis=0)), axis=0), 1e-9)
+    sigma = np.maximum(MAD_TO_SIGMA * np.median(np.abs(residual - np.median(residual, axis=0)), axis=0), 1e-9)
     # Sandwich standard error (White 1980), outliers included, with the observed curvature as the information. The
     # squared slope of a noisy signal overestimates it.
     pull = (residual - np.median(residual, axis=0)) * slope / sigma**2
@@ -92,7 +93,7 @@ def _moderate(seen: FloatArray, recorded: FloatArray, known: BoolArray) -> Float
     """Odometry (m, c) at the known intervals, centered and clipped to the range of the velocities."""
     x = recorded[known] - np.median(recorded[known], axis=0)
     y = seen[known] - np.median(seen[known], axis=0)
-    reach = np.abs(x).max(axis=0) + 3.0 * 1.4826 * np.median(np.abs(y - x), axis=0)
+    reach = np.abs(x).max(axis=0) + 3.0 * MAD_TO_SIGMA * np.median(np.abs(y - x), axis=0)
     y = np.clip(y, -reach, reach)
     return np.asarray(y - y.mean(axis=0), dtype=np.float64)
 

@@ -117,13 +117,13 @@ def _noise(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _tracks(tracks: TrackStatistics) -> dict[str, Any]:
-    links, wrong = int(tracks.links.sum()), int(tracks.wrong.sum())
+    matches, wrong = int(tracks.matches.sum()), int(tracks.wrong.sum())
     return {
         # frame k: matches from frame k - 1 to it
         "wrong_matches": [np.nan, *tracks.wrong_share.tolist()],
         "tracks": {
-            "wrong_share": wrong / links if links else np.nan,
-            "wrong_share_after": tracks.wrong_after if links else np.nan,
+            "wrong_share": wrong / matches if matches else np.nan,
+            "wrong_share_after": tracks.wrong_after if matches else np.nan,
             "burst_intervals": np.flatnonzero(tracks.burst).tolist(),
             "copied_observations": tracks.copied,
             "disparity_not_positive": tracks.not_positive,

@@ -10,10 +10,10 @@ from fgbaseline.data.wording import per_cent, plural
 
 from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY
 from .frame_spans import spans
-from .track_statistics import MIN_USABLE, MOVING_LINKS, TrackStatistics
+from .track_statistics import MIN_USABLE, MOVING_MATCHES, TrackStatistics
 
 MIN_WRONG = 0.10
-"""share of wrong links that is reported: every tracker has some"""
+"""share of wrong matches that is reported: every tracker has some"""
 MIN_DEPTHLESS, MIN_TINY, MIN_ROWS, MIN_MOVING = 0.0075, 0.02, 0.01, 0.01
 """shares of the observations, or of the tracks for `MIN_MOVING`, that are reported"""
 
@@ -55,14 +55,14 @@ def _copies(repeated: BoolArray, tracks: TrackStatistics) -> list[Finding]:
 
 
 def _wrong_matches(tracks: TrackStatistics) -> list[Finding]:
-    links, wrong = int(tracks.links.sum()), int(tracks.wrong.sum())
-    if wrong <= MIN_WRONG * links or links == 0:
+    matches, wrong = int(tracks.matches.sum()), int(tracks.wrong.sum())
+    if wrong <= MIN_WRONG * matches or matches == 0:
         return []
     text = (
-        f"{per_cent(wrong / links)} of the matches from a frame to the next contradict the motion of the others "
-        f"({wrong:,} of {links:,})."
+        f"{per_cent(wrong / matches)} of the matches from a frame to the next contradict the motion of the others "
+        f"({wrong:,} of {matches:,})."
     )
-    return [_counted("wrong_matches", text, wrong / links, tracks.wrong_after, "share of the matches")]
+    return [_counted("wrong_matches", text, wrong / matches, tracks.wrong_after, "share of the matches")]
 
 
 def _bursts(tracks: TrackStatistics) -> list[Finding]:
@@ -73,7 +73,7 @@ def _bursts(tracks: TrackStatistics) -> list[Finding]:
     text = (
         f"Wrong matches come in bursts: in {plural(len(frames), 'interval')} more than a third of the matches "
         f"contradict the motion (after frames {spans(frames)}). The worst follows frame {worst}: "
-        f"{per_cent(tracks.wrong_share[worst])} of {plural(int(tracks.links[worst]), 'match', 'matches')}."
+        f"{per_cent(tracks.wrong_share[worst])} of {plural(int(tracks.matches[worst]), 'match', 'matches')}."
     )
     return [_counted("bursts", text, len(frames), tracks.bursts_after, "intervals")]
 
@@ -83,8 +83,8 @@ def _moving(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
     if tracks.moving <= MIN_MOVING * n_tracks:
         return []
     text = (
-        f"{tracks.moving:,} of {plural(n_tracks, 'track')} contradict the motion in {MOVING_LINKS} or more consecutive "
-        "intervals: moving objects, or tracks that slide."
+        f"{tracks.moving:,} of {plural(n_tracks, 'track')} contradict the motion in {MOVING_MATCHES} or more "
+        "consecutive intervals: moving objects, or tracks that slide."
     )
     return [_counted("moving", text, tracks.moving, tracks.moving_after, "tracks")]
 

@@ -15,13 +15,13 @@ from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY, consecutive
 from ..velocity_diagnosis.result import Diagnosis
 
 BURST = 1.0 / 3.0
-"""share of the links of an interval that contradict its motion, from which on it is a burst"""
-BURST_LINKS = 5
-"""links of a burst that contradict it at least, so that an interval with few features is none"""
+"""share of the matches of an interval that contradict its motion, from which on it is a burst"""
+BURST_MATCHES = 5
+"""matches of a burst that contradict it at least, so that an interval with few features is none"""
 WRONG_PIXEL = 0.5
 """px: usual noise of the rows; segments within four sigmas of it are not wrong"""
-MOVING_LINKS = 5
-"""consecutive links of a track that contradict the motion: a wrong match contradicts it once or twice"""
+MOVING_MATCHES = 5
+"""consecutive matches of a track that contradict the motion: a wrong match contradicts it once or twice"""
 MIN_USABLE = 6
 """features of a frame, below which odometry has no motion"""
 GAP = 2.5
@@ -42,30 +42,30 @@ class TrackStatistics:
     """observations that are the same to the bit as the frame before, in intervals whose tracks are copies"""
     usable: IntArray
     """(T,) observations of each frame that can be triangulated"""
-    links: IntArray
+    matches: IntArray
     """(T-1,) track segments over each interval with a known motion"""
     wrong: IntArray
-    """(T-1,) those that contradict this motion"""
+    """(T-1,) matches that contradict the motion of their interval"""
     wrong_after: float
-    """share of the links that contradict it, of those that the repaired and masked recording has left"""
+    """share of wrong matches among those that repair and mask leave"""
     bursts_after: int
-    """intervals with a `burst` among these"""
+    """intervals with a `burst` among the matches that repair and mask leave"""
     moving: int
-    """tracks that contradict the motion over `MOVING_LINKS` intervals in succession"""
+    """tracks that contradict the motion over `MOVING_MATCHES` intervals in succession"""
     moving_after: int
-    """tracks that still do among the links that repair and mask have left"""
+    """the same count over the matches that repair and mask leave"""
     gaps: IntArray
     """intervals longer than `GAP` times the median"""
 
     @property
     def wrong_share(self) -> FloatArray:
-        """(T-1,) share of the links that contradict the motion; NaN where it is unknown."""
-        return np.where(self.links > 0, self.wrong / np.maximum(self.links, 1), np.nan)
+        """(T-1,) share of the matches that contradict the motion; NaN where it is unknown."""
+        return np.where(self.matches > 0, self.wrong / np.maximum(self.matches, 1), np.nan)
 
     @property
     def burst(self) -> BoolArray:
-        """(T-1,) intervals in which a third or more of the links contradict the motion."""
-        return _burst(self.wrong, self.links)
+        """(T-1,) intervals in which a third or more of the matches contradict the motion."""
+        return _burst(self.wrong, self.matches)
 
     @property
     def few(self) -> BoolArray:
@@ -78,29 +78,29 @@ def track_statistics(diagnosis: Diagnosis, repaired: Repaired | None = None) -> 
     sequence = diagnosis.sequence
     o, n = sequence.observations, sequence.n_frames - 1
     apart = disparity(o.pixel)
-    links, wrong, moving, moving_after = np.zeros(n, np.int64), np.zeros(n, np.int64), 0, 0
+    matches, wrong, moving, moving_after = np.zeros(n, np.int64), np.zeros(n, np.int64), 0, 0
     after, bursts_after = 0.0, 0
     odometry = diagnosis.odometry
     if odometry is not None:
-        known = odometry.known[odometry.links.frame]
+        known = odometry.known[odometry.segments.frame]
         floor = max(1.0, WRONG_PIXEL / odometry.pixel_sigma)
-        outlier = known & (odometry.whitened > TRUNCATION * floor**2)
-        links = np.bincount(odometry.links.frame[known], minlength=n)
-        wrong = np.bincount(odometry.links.frame[outlier], minlength=n)
-        moving = _moving(o.landmark[odometry.links.after], odometry.links.frame, outlier)
+        outlier = known & (odometry.whitened_squared > TRUNCATION * floor**2)
+        matches = np.bincount(odometry.segments.frame[known], minlength=n)
+        wrong = np.bincount(odometry.segments.frame[outlier], minlength=n)
+        moving = _moving(o.landmark[odometry.segments.after], odometry.segments.frame, outlier)
         repaired = repaired or repair(diagnosis, MaskSettings())
-        left = known & _left(sequence, repaired, odometry.links.before, odometry.links.after)
+        left = known & _left(sequence, repaired, odometry.segments.before, odometry.segments.after)
         after = float(outlier[left].mean()) if left.any() else 0.0
-        by_interval = [np.bincount(odometry.links.frame[which], minlength=n) for which in (outlier & left, left)]
+        by_interval = [np.bincount(odometry.segments.frame[which], minlength=n) for which in (outlier & left, left)]
         bursts_after = int(_burst(*by_interval).sum())
-        moving_after = _moving(o.landmark[odometry.links.after], odometry.links.frame, outlier & left)
+        moving_after = _moving(o.landmark[odometry.segments.after], odometry.segments.frame, outlier & left)
     return TrackStatistics(
         not_positive=int(np.sum(apart <= 0)),
         tiny=int(np.sum((apart > 0) & (apart <= MIN_DISPARITY))),
         rows=int(np.sum(np.abs(o.pixel[:, 1] - o.pixel[:, 3]) > MAX_ROW_MISMATCH)),
         copied=_copied(sequence, diagnosis.repeated),
         usable=np.bincount(o.frame[is_usable(sequence)], minlength=n + 1),
-        links=links,
+        matches=matches,
         wrong=wrong,
         wrong_after=after,
         bursts_after=bursts_after,
@@ -110,8 +110,8 @@ def track_statistics(diagnosis: Diagnosis, repaired: Repaired | None = None) -> 
     )
 
 
-def _burst(wrong: IntArray, links: IntArray) -> BoolArray:
-    return np.asarray((wrong >= BURST_LINKS) & (wrong > BURST * links), dtype=np.bool_)
+def _burst(wrong: IntArray, matches: IntArray) -> BoolArray:
+    return np.asarray((wrong >= BURST_MATCHES) & (wrong > BURST * matches), dtype=np.bool_)
 
 
 def _copied(sequence: Sequence, repeated: BoolArray) -> int:
@@ -124,19 +124,19 @@ def _copied(sequence: Sequence, repeated: BoolArray) -> int:
 
 
 def _moving(landmark: IntArray, frame: IntArray, outlier: BoolArray) -> int:
-    """Number of landmarks with `MOVING_LINKS` outlier links in succession."""
+    """Number of landmarks with `MOVING_MATCHES` outlier matches in succession."""
     order = np.lexsort((frame, landmark))
     landmark, frame, outlier = landmark[order], frame[order], outlier[order]
     same = (landmark[1:] == landmark[:-1]) & (frame[1:] == frame[:-1] + 1) & (outlier[1:] == outlier[:-1])
     run = np.cumsum(~np.r_[False, same]) - 1
     if len(run) == 0:
         return 0
-    long_enough = np.bincount(run) >= MOVING_LINKS
+    long_enough = np.bincount(run) >= MOVING_MATCHES
     return len(np.unique(landmark[outlier & long_enough[run]]))
 
 
 def _left(sequence: Sequence, repaired: Repaired, before: IntArray, after: IntArray) -> BoolArray:
-    """(n,) links of the recording whose two observations are still one track's once it is repaired and masked."""
+    """(n,) matches of the recording whose two observations are still one track's once it is repaired and masked."""
     o, now = sequence.observations, repaired.sequence.observations
     # The repair gives observations other landmarks, and with them another order within their frame.
     was, is_now = (np.lexsort((*x.pixel.T, x.frame)) for x in (o, now))

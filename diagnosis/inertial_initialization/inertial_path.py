@@ -10,11 +10,11 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3, strapdown
 
 from ..odometry.stereo_odometry import Odometry
+from ..robust_scale import CHI_SQUARE_MEDIAN
 from .initial_state import Start, inflated, neighbors
 from .least_squares import Solution, solve_least_squares
 from .states import RelativePoses, States, motions_between
 
-CHI_SQUARE_6_MEDIAN = 5.3481
 WINDOW = 1.0
 """s, over which errors of the odometry add up"""
 MIN_WINDOWS = 5
@@ -89,4 +89,4 @@ def _factor(states: States, relative: RelativePoses, length: int) -> float:
     moved = se3.inverse(states.pose[first]) @ states.pose[first + length]
     error = se3.log(se3.inverse(motion) @ moved)
     squared = np.einsum("ni,ni->n", error, np.linalg.solve(covariance, error[:, :, None])[:, :, 0])
-    return float(np.sqrt(np.median(squared) / CHI_SQUARE_6_MEDIAN))
+    return float(np.sqrt(np.median(squared) / CHI_SQUARE_MEDIAN[6]))

@@ -11,6 +11,7 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.geometry import FloatArray, so3, strapdown
 
+from ..robust_scale import MAD_TO_SIGMA
 from .least_squares import ACCELEROMETER_BIAS_SIGMA, GYROSCOPE_BIAS_SIGMA
 from .states import Motions, RelativePoses, States, motions_between
 
@@ -56,7 +57,7 @@ def gyroscope_bias(imu: ImuIntervals, frames: IntArray, rotation: FloatArray, kn
         J = motions.transition[known, strapdown.ROTATION, strapdown.GYROSCOPE_BIAS]
         residual = so3.log_so3(np.swapaxes(motions.rotation[known], 1, 2) @ rotation[known])
         dt = motions.dt[known]
-        scatter = 1.4826 * np.median(np.linalg.norm(residual - np.median(residual, axis=0), axis=1)) + 1e-6
+        scatter = MAD_TO_SIGMA * np.median(np.linalg.norm(residual - np.median(residual, axis=0), axis=1)) + 1e-6
         norm = np.linalg.norm(residual - np.median(residual / dt[:, None], axis=0) * dt[:, None], axis=1)
         weight = np.minimum(1.0, 2.0 * scatter / np.maximum(norm, 1e-12)) / scatter**2
         H = np.einsum("n,nij,nik->jk", weight, J, J) + np.eye(3) * GYROSCOPE_BIAS_SIGMA**-2

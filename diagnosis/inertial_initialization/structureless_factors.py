@@ -87,9 +87,9 @@ def _without_points(
 
 
 def keyframe_tracks(sequence: Sequence, seen: Odometry, frames: IntArray, sigma: float) -> KeyframeTracks:
-    """The tracks that the odometry links, in the keyframes `frames` (k,), with `sigma` px of each of the four rows."""
+    """Tracks in the keyframes `frames` (k,), of segments that agree with the odometry; `sigma` px of each pixel row."""
     o = sequence.observations
-    chain = track_chains(seen.links.before, seen.links.after, seen.inlier, o)
+    chain = track_chains(seen.segments.before, seen.segments.after, seen.inlier, o)
     place = np.full(sequence.n_frames, -1, dtype=np.int64)
     place[frames] = np.arange(len(frames))
     chosen = np.flatnonzero((place[o.frame] >= 0) & (chain >= 0))

@@ -15,6 +15,7 @@ from fgbaseline.geometry import FloatArray, so3, strapdown
 
 from ..inertial_initialization.least_squares import ACCELEROMETER_BIAS_SIGMA
 from ..inertial_initialization.states import Motions, States
+from ..robust_scale import MAD_TO_SIGMA
 from .window_tracks import Rays
 
 ROUNDS = 5
@@ -54,7 +55,7 @@ def closed_form(imu: ImuIntervals, rays: Rays, motions: Motions, lever: FloatArr
         apart = point[rays.point] - moved[rays.keyframe]
         depth = np.einsum("ni,ni->n", apart, direction)
         miss = np.linalg.norm((across @ apart[:, :, None])[:, :, 0], axis=1) / np.maximum(depth, NEAREST)
-        bulk = max(ray_sigma, 1.4826 * float(np.nanmedian(miss)))
+        bulk = max(ray_sigma, MAD_TO_SIGMA * float(np.nanmedian(miss)))
         weight = np.nan_to_num(np.minimum(1.0, HUBER * bulk / np.maximum(miss, 1e-12)))
     return _states(motions, R, y)
 

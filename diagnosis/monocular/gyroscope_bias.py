@@ -11,6 +11,7 @@ from fgbaseline.geometry import FloatArray
 
 from ..inertial_initialization.least_squares import GYROSCOPE_BIAS_SIGMA
 from ..inertial_initialization.states import Motions
+from ..robust_scale import MAD_TO_SIGMA
 from .window_tracks import Rays
 
 MIN_COMMON = 8
@@ -42,7 +43,7 @@ def epipolar_bias(rays: Rays, integrated: Motions) -> FloatArray:
         residual = _residuals(pairs, axes, integrated, bias)
         slopes = [(_residuals(pairs, axes, integrated, bias + SLOPE * e) - residual) / SLOPE for e in np.eye(3)]
         J = np.stack(slopes, axis=1)
-        sigma = max(SMALLEST_SIGMA, 1.4826 * float(np.median(np.abs(residual))))
+        sigma = max(SMALLEST_SIGMA, MAD_TO_SIGMA * float(np.median(np.abs(residual))))
         weight = np.minimum(1.0, HUBER * sigma / np.maximum(np.abs(residual), 1e-12)) / sigma**2
         H = (J.T * weight) @ J + np.eye(3) * GYROSCOPE_BIAS_SIGMA**-2
         step = np.linalg.solve(H, -(J.T * weight) @ residual - bias * GYROSCOPE_BIAS_SIGMA**-2)

@@ -17,6 +17,7 @@ from ..inertial_initialization.initial_state import NO_POSES, Start
 from ..inertial_initialization.least_squares import Solution, solve_least_squares
 from ..inertial_initialization.states import RelativePoses, States, motions_between
 from ..inertial_initialization.structureless_factors import KeyframeTracks
+from ..robust_scale import CHI_SQUARE_MEDIAN
 from .closed_form import closed_form
 from .gyroscope_bias import epipolar_bias
 from .window_tracks import first_inverse_depths, keyframe_tracks, rays_of, squared_residuals, window_points
@@ -32,7 +33,6 @@ FIRST_PIXEL = 1.0
 """px, noise of a row in the first solution"""
 SMALLEST_PIXEL = 0.05
 """px"""
-CHI_SQUARE_2_MEDIAN = 1.3863
 NEAR = 97.5
 """percentile of the inverse depths that are those of the nearest points"""
 FITTING = 100.0
@@ -178,7 +178,7 @@ def _pixel_noise(tracks: KeyframeTracks, solution: Solution) -> float:
     if known.sum() < 0.5 * len(squared) or np.median(squared[known]) > FITTING:
         raise ValueError("its least squares does not converge")
     freedom = 1.0 - 3.0 * len(np.unique(tracks.point[known])) / (2.0 * known.sum())
-    found = np.sqrt(np.median(squared[known]) / CHI_SQUARE_2_MEDIAN / max(freedom, 0.1))
+    found = np.sqrt(np.median(squared[known]) / CHI_SQUARE_MEDIAN[2] / max(freedom, 0.1))
     return max(SMALLEST_PIXEL, FIRST_PIXEL * float(found))
 
 

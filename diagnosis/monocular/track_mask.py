@@ -14,7 +14,7 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
 from ..odometry.epipolar_motion import beyond_scene, epipolar_motions
-from ..odometry.monocular_odometry import ray_links, track_links
+from ..odometry.monocular_odometry import ray_matches, track_pairs
 from ..repairs.repaired_sequence import RepairedTracks, renumbered_tracks, truth_of_landmarks
 from ..tracks.observation_mask import MaskSettings, prediction_gate, split_tracks
 from ..tracks.track_segments import consecutive
@@ -35,11 +35,11 @@ class EpipolarConsistency:
         """step -> (n,) px, by which an observation and the one that many frames later leave their epipolar line, or
         the scene along it; NaN where there is none, or no motion is known"""
         for step in STEPS:
-            before, after = track_links(sequence, step)
-            links = ray_links(sequence, before, after)
-            found = epipolar_motions(links, sequence.n_frames - 1)
-            across, along = np.sqrt(found.whitened) * found.sigma, beyond_scene(links, found.motion)
-            along = np.where(found.directed(PIXEL / sequence.camera.fu)[links.pair], along, 0.0)
+            before, after = track_pairs(sequence, step)
+            matches = ray_matches(sequence, before, after)
+            found = epipolar_motions(matches, sequence.n_frames - 1)
+            across, along = np.sqrt(found.whitened_squared) * found.sigma, beyond_scene(matches, found.motion)
+            along = np.where(found.directed(PIXEL / sequence.camera.fu)[matches.pair], along, 0.0)
             self.error[step] = np.full(len(sequence.observations), np.nan)
             self.error[step][before] = np.maximum(across, along) * sequence.camera.fu
         self.gate = prediction_gate(self.error[1][np.isfinite(self.error[1])])
@@ -60,8 +60,8 @@ def monocular_tracks(sequence: Sequence) -> RepairedTracks:
     before, after = consecutive(sequence)
     copied = np.zeros(len(o), dtype=np.bool_)
     copied[after[(o.pixel[before, :2] == o.pixel[after, :2]).all(axis=1)]] = True
-    links = EpipolarConsistency(sequence)
-    return renumbered_tracks(sequence, split_tracks(sequence, links, MaskSettings(), copied), links.gate)
+    test = EpipolarConsistency(sequence)
+    return renumbered_tracks(sequence, split_tracks(sequence, test, MaskSettings(), copied), test.gate)
 
 
 def used(sequence: Sequence, tracks: RepairedTracks) -> Sequence:

@@ -9,6 +9,7 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
 from ..odometry.stereo_odometry import Odometry
+from ..robust_scale import CHI_SQUARE_MEDIAN, MAD_TO_SIGMA
 from ..window_adjustment.bundle_adjustment import CALIBRATION_PRIOR, WindowFit, fit_each_window
 from ..window_adjustment.residuals import N_CALIBRATION
 from ..window_adjustment.selection import spread_spans, unbroken_spans, windows_of
@@ -19,8 +20,6 @@ START = NoiseSettings(pixel=1.0, linear_velocity=0.4, angular_velocity=0.02)
 """px, baselines/s and rad/s"""
 FLOOR = NoiseSettings(pixel=0.02, linear_velocity=2e-4, angular_velocity=1e-5)
 """px, baselines/s and rad/s: no noise is less"""
-CHI_SQUARE_MEDIAN = 0.4549
-"""median of the chi-square distribution with one degree of freedom"""
 EFFICIENCY = 0.37
 """efficiency of a variance from a median, relative to one from all residuals"""
 SIGNIFICANT = 4.0
@@ -121,7 +120,7 @@ def half_cost(
 def _components(fits: list[WindowFit], sigmas: NoiseSettings, baseline: float) -> NoiseSettings:
     residual, redundancy = _redundant_residuals(fits)
     is_known = (~np.isnan(residual)).any(axis=0).all()
-    variance = np.nanmedian(residual**2 / redundancy, axis=0) / CHI_SQUARE_MEDIAN if is_known else np.zeros(6)
+    variance = np.nanmedian(residual**2 / redundancy, axis=0) / CHI_SQUARE_MEDIAN[1] if is_known else np.zeros(6)
     pixel = np.median([fit.pixel_squared.sum() / max(fit.degrees_of_freedom, 1.0) for fit in fits])
     return NoiseSettings(
         pixel=max(FLOOR.pixel, sigmas.pixel * float(np.sqrt(pixel))),
@@ -142,7 +141,7 @@ def _agreed(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]:
     information = np.array([fit.calibration_information for fit in fits])
     values = np.array([fit.calibration for fit in fits])
     center = np.median(values, axis=0)
-    spread = 1.4826 * np.median(np.abs(values - center), axis=0) + 1e-9
+    spread = MAD_TO_SIGMA * np.median(np.abs(values - center), axis=0) + 1e-9
     keep = (np.abs(values - center) < 5.0 * spread).all(axis=1) if len(fits) > 4 else np.ones(len(fits), dtype=bool)
     total = information[keep].sum(axis=0) + CALIBRATION_PRIOR
     mean = np.linalg.solve(total, np.einsum("wij,wj->i", information[keep], values[keep]))

@@ -14,6 +14,7 @@ from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3, so3
 
+from ..robust_scale import CHI_SQUARE_MEDIAN
 from ..window_adjustment.bundle_adjustment import fit_each_window
 from ..window_adjustment.residuals import MISALIGNMENT, SCALE, Window, WindowData
 
@@ -25,7 +26,6 @@ MIN_WINDOWS = 3
 LASTING = 1.5
 """factor between halves of the tracks from which on pixel errors count as time-correlated"""
 MAX_FACTOR = 20.0
-CHI_SQUARE_6_MEDIAN = 5.3481
 ITERATIONS = 4
 
 
@@ -111,9 +111,9 @@ def _factor(differences: list[tuple[FloatArray, FloatArray, FloatArray]]) -> flo
         return float(np.median(np.einsum("ni,ni->n", d, solved)))
 
     low, high = 1.0, MAX_FACTOR
-    if median(low) <= CHI_SQUARE_6_MEDIAN:
+    if median(low) <= CHI_SQUARE_MEDIAN[6]:
         return low
     while high - low > 1e-3:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if median(middle) > CHI_SQUARE_6_MEDIAN else (low, middle)
+        low, high = (middle, high) if median(middle) > CHI_SQUARE_MEDIAN[6] else (low, middle)
     return high

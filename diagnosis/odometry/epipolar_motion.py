@@ -14,13 +14,14 @@ import numpy as np
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray, so3
 
-MIN_LINKS = 12
+from ..robust_scale import CHI_SQUARE_MEDIAN
+
+MIN_MATCHES = 12
 """tracks of a pair from which on its motion is determined: twice its degrees of freedom, and some wrong ones"""
 ROUNDS, FLOW_ROUNDS, DIRECTION_ROUNDS = 12, 5, 3
 FREEDOM = 5
 TRUNCATION = 9.0
 """squared whitened residual of an outlier"""
-CHI_SQUARE_1_MEDIAN = 0.4549
 DIRECTED = 0.05
 """rad, sigma of a direction of motion that is known"""
 NEARER = 4.0
@@ -30,7 +31,7 @@ SMALLEST_SIGMA = 1e-6
 """rad, of a ray"""
 
 
-class Links(NamedTuple):
+class RayMatches(NamedTuple):
     """n tracks that two views share, sorted by pair of views."""
 
     pair: IntArray
@@ -53,17 +54,17 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EpipolarMotions:
-    """Motions of p pairs, and how n links fit them."""
+    """Motions of p pairs, and how n matches fit them."""
 
     known: BoolArray
     """(p,)"""
     motion: Motion
     covariance: FloatArray
     """(p, 5, 5) of the right perturbation of the rotation and of the direction's tangent, rad^2; NaN where unknown"""
-    whitened: FloatArray
-    """(n,) squared residual of each link at `sigma`; NaN where the motion is unknown"""
+    whitened_squared: FloatArray
+    """(n,) squared residual of each match over `sigma` squared; NaN where the motion is unknown"""
     sigma: float
-    """rad, of a ray, from the bulk of the residuals"""
+    """rad, of a ray, from the median of the residuals"""
 
     def directed(self, least: float) -> BoolArray:
         """(p,) whether the direction is known to `DIRECTED`, with rays of `least` rad or more."""
@@ -71,15 +72,15 @@ class EpipolarMotions:
         return np.asarray(np.nan_to_num(variance, nan=np.inf) < DIRECTED**2, dtype=np.bool_)
 
 
-def epipolar_motions(links: Links, n_pairs: int) -> EpipolarMotions:
-    """Motions of all pairs with at least `MIN_LINKS` links."""
-    count = np.bincount(links.pair, minlength=n_pairs)
-    enough = count >= MIN_LINKS
-    chosen = np.flatnonzero(enough[links.pair])
-    used = Links(links.pair[chosen], links.first[chosen], links.second[chosen])
+def epipolar_motions(matches: RayMatches, n_pairs: int) -> EpipolarMotions:
+    """Motions of all pairs with at least `MIN_MATCHES` matches."""
+    count = np.bincount(matches.pair, minlength=n_pairs)
+    enough = count >= MIN_MATCHES
+    chosen = np.flatnonzero(enough[matches.pair])
+    used = RayMatches(matches.pair[chosen], matches.first[chosen], matches.second[chosen])
     still = np.tile(np.eye(3), (n_pairs, 1, 1))
     if len(chosen) == 0:
-        nothing = np.full((n_pairs, FREEDOM, FREEDOM), np.nan), np.full(len(links.pair), np.nan)
+        nothing = np.full((n_pairs, FREEDOM, FREEDOM), np.nan), np.full(len(matches.pair), np.nan)
         return EpipolarMotions(enough, Motion(still, still[:, 2]), *nothing, 1.0)
     best = _refined(used, _along(used, _least_flow(used, still)))
     best = _better(used, best, _refined(used, _along(used, still)))
@@ -89,69 +90,69 @@ def epipolar_motions(links: Links, n_pairs: int) -> EpipolarMotions:
     sigma = _bulk_sigma(used, squared, count)
     inlier = squared < TRUNCATION * sigma**2
     H, _ = _normal_equations(used, best, inlier.astype(np.float64), n_pairs)
-    known = enough & (np.bincount(used.pair[inlier], minlength=n_pairs) >= MIN_LINKS)
+    known = enough & (np.bincount(used.pair[inlier], minlength=n_pairs) >= MIN_MATCHES)
     known[known] = np.linalg.eigvalsh(H[known])[:, 0] > DAMPING
-    covariance, whitened = np.full((n_pairs, FREEDOM, FREEDOM), np.nan), np.full(len(links.pair), np.nan)
+    covariance, whitened = np.full((n_pairs, FREEDOM, FREEDOM), np.nan), np.full(len(matches.pair), np.nan)
     covariance[known] = sigma**2 * np.linalg.inv(H[known])
     whitened[chosen] = np.where(known[used.pair], squared / sigma**2, np.nan)
     return EpipolarMotions(known, best, covariance, whitened, sigma)
 
 
-def beyond_scene(links: Links, motion: Motion) -> FloatArray:
+def beyond_scene(matches: RayMatches, motion: Motion) -> FloatArray:
     """(n,) rad by which a track moves along its epipolar line otherwise than a point of the scene does.
 
     A point lies no farther than infinity, and no nearer than the nearest tenth of its pair's points by a factor of
     `NEARER`.
     """
-    moved, t = _turned(links, motion.rotation), motion.direction[links.pair]
-    across = t - (t * links.first).sum(axis=1)[:, None] * links.first
+    moved, t = _turned(matches, motion.rotation), motion.direction[matches.pair]
+    across = t - (t * matches.first).sum(axis=1)[:, None] * matches.first
     sine = np.maximum(np.linalg.norm(across, axis=1), SMALLEST_SIGMA)
-    shift = -((moved - links.first) * across).sum(axis=1) / sine
-    order = np.lexsort((shift / sine, links.pair))
-    count = np.bincount(links.pair, minlength=len(motion.rotation))
+    shift = -((moved - matches.first) * across).sum(axis=1) / sine
+    order = np.lexsort((shift / sine, matches.pair))
+    count = np.bincount(matches.pair, minlength=len(motion.rotation))
     place = np.cumsum(count) - count + (0.9 * (count - 1)).astype(np.int64)
     near = (shift / sine)[order][np.clip(place, 0, max(len(order) - 1, 0))] if len(order) else np.zeros(len(count))
-    beyond = np.maximum(-shift, shift - NEARER * np.maximum(near, 0.0)[links.pair] * sine)
+    beyond = np.maximum(-shift, shift - NEARER * np.maximum(near, 0.0)[matches.pair] * sine)
     return np.asarray(np.maximum(beyond, 0.0), dtype=np.float64)
 
 
-def _least_flow(links: Links, rotation: FloatArray) -> FloatArray:
+def _least_flow(matches: RayMatches, rotation: FloatArray) -> FloatArray:
     """Rotations (p, 3, 3) that bring the rays of both views nearest to each other, by robust small steps."""
     for _ in range(FLOW_ROUNDS):
-        moved = _turned(links, rotation)
-        apart = np.cross(moved, links.first)  # the rotation about this axis, in the axes of the first view
+        moved = _turned(matches, rotation)
+        apart = np.cross(moved, matches.first)  # the rotation about this axis, in the axes of the first view
         squared = (apart**2).sum(axis=1)
         weight = _robust(squared, float(np.median(squared)))
         across = np.eye(3) - moved[:, :, None] * moved[:, None, :]
-        H = _sums(links, weight[:, None, None] * across, len(rotation)) + DAMPING * np.eye(3)
-        turn = np.linalg.solve(H, _sums(links, weight[:, None] * apart, len(rotation))[:, :, None])[:, :, 0]
+        H = _sums(matches, weight[:, None, None] * across, len(rotation)) + DAMPING * np.eye(3)
+        turn = np.linalg.solve(H, _sums(matches, weight[:, None] * apart, len(rotation))[:, :, None])[:, :, 0]
         rotation = so3.exp_so3(turn) @ rotation
     return rotation
 
 
-def _along(links: Links, rotation: FloatArray) -> Motion:
+def _along(matches: RayMatches, rotation: FloatArray) -> Motion:
     """Motions at given rotations: their direction is in all epipolar planes, and what is passed moves against it."""
-    moved = _turned(links, rotation)
-    normal = np.cross(links.first, moved)
+    moved = _turned(matches, rotation)
+    normal = np.cross(matches.first, moved)
     weight, axis = np.ones(len(normal)), np.zeros((len(rotation), 3))
     for _ in range(DIRECTION_ROUNDS):
-        scatter = _sums(links, (weight[:, None] * normal)[:, :, None] * normal[:, None, :], len(rotation))
+        scatter = _sums(matches, (weight[:, None] * normal)[:, :, None] * normal[:, None, :], len(rotation))
         axis = np.linalg.eigh(scatter)[1][:, :, 0]
-        squared = (normal * axis[links.pair]).sum(axis=1) ** 2
-        weight = _robust(squared, float(np.median(squared)) / CHI_SQUARE_1_MEDIAN)
-    ahead = np.sign(((moved - links.first) * axis[links.pair]).sum(axis=1))
-    against = _sums(links, ahead[:, None], len(rotation)) <= 0.0
+        squared = (normal * axis[matches.pair]).sum(axis=1) ** 2
+        weight = _robust(squared, float(np.median(squared)) / CHI_SQUARE_MEDIAN[1])
+    ahead = np.sign(((moved - matches.first) * axis[matches.pair]).sum(axis=1))
+    against = _sums(matches, ahead[:, None], len(rotation)) <= 0.0
     return Motion(rotation, np.where(against, axis, -axis))
 
 
-def _refined(links: Links, motion: Motion) -> Motion:
+def _refined(matches: RayMatches, motion: Motion) -> Motion:
     for step in range(ROUNDS):
-        residual, _ = _residuals(links, motion)
+        residual, _ = _residuals(matches, motion)
         squared = residual**2
         # Geman-McClure kernel, with its scale annealed down to that of the noise
-        bulk = float(np.median(squared)) / CHI_SQUARE_1_MEDIAN
+        bulk = float(np.median(squared)) / CHI_SQUARE_MEDIAN[1]
         weight = _robust(squared, bulk * max(9.0, 200.0 * 0.5**step))
-        H, g = _normal_equations(links, motion, weight, len(motion.rotation))
+        H, g = _normal_equations(matches, motion, weight, len(motion.rotation))
         delta = np.linalg.solve(H + DAMPING * np.eye(FREEDOM), g[:, :, None])[:, :, 0]
         moved = motion.direction + (_basis(motion.direction) @ delta[:, 3:, None])[:, :, 0]
         moved /= np.linalg.norm(moved, axis=1, keepdims=True)
@@ -159,46 +160,48 @@ def _refined(links: Links, motion: Motion) -> Motion:
     return motion
 
 
-def _better(links: Links, best: Motion, other: Motion) -> Motion:
+def _better(matches: RayMatches, best: Motion, other: Motion) -> Motion:
     """For each pair the motion with the smaller truncated cost."""
-    squared = np.stack([_residuals(links, each)[0] ** 2 for each in (best, other)], axis=1)
-    bulk = max(float(np.median(squared[:, 0])) / CHI_SQUARE_1_MEDIAN, SMALLEST_SIGMA**2)
-    cost = _sums(links, np.minimum(squared, TRUNCATION * bulk), len(best.rotation))
+    squared = np.stack([_residuals(matches, each)[0] ** 2 for each in (best, other)], axis=1)
+    bulk = max(float(np.median(squared[:, 0])) / CHI_SQUARE_MEDIAN[1], SMALLEST_SIGMA**2)
+    cost = _sums(matches, np.minimum(squared, TRUNCATION * bulk), len(best.rotation))
     better = cost[:, 1] < cost[:, 0]
     rotation = np.where(better[:, None, None], other.rotation, best.rotation)
     return Motion(rotation, np.where(better[:, None], other.direction, best.direction))
 
 
-def _residuals(links: Links, motion: Motion) -> tuple[FloatArray, FloatArray]:
+def _residuals(matches: RayMatches, motion: Motion) -> tuple[FloatArray, FloatArray]:
     """(n,) residuals in rad, and (n,) their divisors."""
-    moved, t = _turned(links, motion.rotation), motion.direction[links.pair]
+    moved, t = _turned(matches, motion.rotation), motion.direction[matches.pair]
     plane = np.cross(t, moved)
-    scale = np.sqrt((plane**2).sum(axis=1) + (np.cross(t, links.first) ** 2).sum(axis=1))
+    scale = np.sqrt((plane**2).sum(axis=1) + (np.cross(t, matches.first) ** 2).sum(axis=1))
     scale = np.maximum(scale, SMALLEST_SIGMA)
-    return (links.first * plane).sum(axis=1) / scale, scale
+    return (matches.first * plane).sum(axis=1) / scale, scale
 
 
-def _normal_equations(links: Links, motion: Motion, weight: FloatArray, n_pairs: int) -> tuple[FloatArray, FloatArray]:
+def _normal_equations(
+    matches: RayMatches, motion: Motion, weight: FloatArray, n_pairs: int
+) -> tuple[FloatArray, FloatArray]:
     """Information (p, 5, 5) and gradient (p, 5) of the rotation's right perturbation and the direction's tangent."""
-    residual, scale = _residuals(links, motion)
-    R, t = motion.rotation[links.pair], motion.direction[links.pair]
-    f, moved = links.first, _turned(links, motion.rotation)
+    residual, scale = _residuals(matches, motion)
+    R, t = motion.rotation[matches.pair], motion.direction[matches.pair]
+    f, moved = matches.first, _turned(matches, motion.rotation)
     back, along = (np.einsum("nji,nj->ni", R, vector) for vector in (np.cross(f, t), t))
     # the divisor moves as well: without its derivative the motion is biased, since small parallax is mostly noise
     near, far = (t * f).sum(axis=1)[:, None], (t * moved).sum(axis=1)[:, None]
     relative = (residual / scale)[:, None]
-    by_rotation = np.cross(links.second, back + relative * far * along)
+    by_rotation = np.cross(matches.second, back + relative * far * along)
     by_direction = np.cross(moved, f) + relative * (near * f + far * moved)
-    tangent = (by_direction[:, None] @ _basis(motion.direction)[links.pair])[:, 0]
+    tangent = (by_direction[:, None] @ _basis(motion.direction)[matches.pair])[:, 0]
     J = np.concatenate([by_rotation, tangent], axis=1) / scale[:, None]
     weighted = weight[:, None] * J
-    H = _sums(links, weighted[:, :, None] * J[:, None, :], n_pairs)
-    return H, _sums(links, -weighted * residual[:, None], n_pairs)
+    H = _sums(matches, weighted[:, :, None] * J[:, None, :], n_pairs)
+    return H, _sums(matches, -weighted * residual[:, None], n_pairs)
 
 
-def _turned(links: Links, rotation: FloatArray) -> FloatArray:
+def _turned(matches: RayMatches, rotation: FloatArray) -> FloatArray:
     """(n, 3) rays of the second view in the axes of the first."""
-    return np.asarray((rotation[links.pair] @ links.second[:, :, None])[:, :, 0])
+    return np.asarray((rotation[matches.pair] @ matches.second[:, :, None])[:, :, 0])
 
 
 def _basis(direction: FloatArray) -> FloatArray:
@@ -214,15 +217,15 @@ def _robust(squared: FloatArray, scale: float) -> FloatArray:
     return np.asarray((scale / (scale + squared)) ** 2, dtype=np.float64)
 
 
-def _bulk_sigma(links: Links, squared: FloatArray, count: IntArray) -> float:
+def _bulk_sigma(matches: RayMatches, squared: FloatArray, count: IntArray) -> float:
     """rad: the deviation at which the median squared residual is that of chi-square, the fitted freedom counted."""
-    freed = squared / (1.0 - FREEDOM / count[links.pair])
-    return max(SMALLEST_SIGMA, float(np.sqrt(np.median(freed) / CHI_SQUARE_1_MEDIAN)))
+    freed = squared / (1.0 - FREEDOM / count[matches.pair])
+    return max(SMALLEST_SIGMA, float(np.sqrt(np.median(freed) / CHI_SQUARE_MEDIAN[1])))
 
 
-def _sums(links: Links, values: FloatArray, n_pairs: int) -> FloatArray:
-    """Sums (p, ...) of values (n, ...) over the links of each pair; zero for pairs without any."""
+def _sums(matches: RayMatches, values: FloatArray, n_pairs: int) -> FloatArray:
+    """Sums (p, ...) of values (n, ...) over the matches of each pair; zero for pairs without any."""
     total = np.zeros((n_pairs, *values.shape[1:]))
-    starts = np.flatnonzero(np.diff(links.pair, prepend=-1))
-    total[links.pair[starts]] = np.add.reduceat(values, starts, axis=0)
+    starts = np.flatnonzero(np.diff(matches.pair, prepend=-1))
+    total[matches.pair[starts]] = np.add.reduceat(values, starts, axis=0)
     return total

@@ -18,30 +18,30 @@ SEED = 20260
 
 
 def best_hypotheses(
-    camera: StereoCamera, links: TrackSegments, n_pairs: int, count: IntArray, known: BoolArray
+    camera: StereoCamera, segments: TrackSegments, n_pairs: int, count: IntArray, known: BoolArray
 ) -> FloatArray:
     """(n_pairs, 4, 4) the motion of least truncated cost among three-point hypotheses and the identity.
 
-    `links` are the segments of the `known` pairs, sorted by pair, `count` (n_pairs,) their number in each pair.
+    `segments` are the segments of the `known` pairs, sorted by pair, `count` (n_pairs,) their number in each pair.
     """
     pairs = np.flatnonzero(known)
     best = np.tile(np.eye(4), (n_pairs, 1, 1))
-    best_cost = _truncated_costs(camera, links, count[pairs], _columns(best[pairs]))[0]
+    best_cost = _truncated_costs(camera, segments, count[pairs], _columns(best[pairs]))[0]
 
     def compete(motions: FloatArray) -> None:
-        costs = _truncated_costs(camera, links, count[pairs], motions)
+        costs = _truncated_costs(camera, segments, count[pairs], motions)
         least, of_pair = np.argmin(costs, axis=0), np.arange(len(pairs))
         better = costs[least, of_pair] < best_cost
         best[pairs[better], :3] = motions[:, :, least[better], of_pair[better]].transpose(2, 0, 1)
         best_cost[better] = costs[least, of_pair][better]
 
-    point = np.ascontiguousarray(links.point.T)
-    after = np.ascontiguousarray(camera.triangulate_rows(links.pixel).T)
+    point = np.ascontiguousarray(segments.point.T)
+    after = np.ascontiguousarray(camera.triangulate_rows(segments.pixel).T)
     rng = np.random.default_rng(SEED)
     start = (np.cumsum(count[pairs]) - count[pairs])[:, None]
     pick = np.concatenate([start + _three_of(rng, count[pairs]) for _ in range(HYPOTHESES)])
     compete(_through_three(point[:, pick.T], after[:, pick.T]).reshape(3, 4, HYPOTHESES, len(pairs)))
-    for shift in (1, -1):  # a neighbor's motion is a good guess where few links are right
+    for shift in (1, -1):  # a neighbor's motion is a good guess where few segments are right
         compete(_columns(np.roll(best, shift, axis=0)[pairs]))
     return best
 
@@ -97,29 +97,29 @@ def _axes_of_plane(points: FloatArray) -> FloatArray:
     return np.stack([first, np.cross(normal, first, axis=0), normal])
 
 
-def _truncated_costs(camera: StereoCamera, links: TrackSegments, count: IntArray, motions: FloatArray) -> FloatArray:
-    """(h, p) sum of the squared pixel residuals of each pair's links under h motions (3, 4, h, p) of it, each
-    truncated; no whitening, for speed. The pairs have `count` (p,) links each."""
+def _truncated_costs(camera: StereoCamera, segments: TrackSegments, count: IntArray, motions: FloatArray) -> FloatArray:
+    """(h, p) sum of the squared pixel residuals of each pair's segments under h motions (3, 4, h, p) of it, each
+    truncated; no whitening, for speed. The pairs have `count` (p,) segments each."""
     h, p = motions.shape[2:]
     P = np.ascontiguousarray((camera.K @ motions.reshape(3, -1)).reshape(3, 4, h, p).transpose(3, 0, 2, 1))
-    point = np.concatenate([links.point.T, np.ones((1, len(links)))])
+    point = np.concatenate([segments.point.T, np.ones((1, len(segments)))])
     starts, costs = np.cumsum(count) - count, np.empty((h, p))
     first = 0
-    for block in links.blocks(1 + BLOCK // h):
+    for block in segments.blocks(1 + BLOCK // h):
         last = int(np.searchsorted(starts, block.stop))
         moved = np.empty((3, h, block.stop - block.start))
         own = starts[first:last].tolist()
         for pair, start, end in zip(range(first, last), own, (*own[1:], block.stop), strict=True):
             at = slice(start - block.start, end - block.start)
             np.matmul(P[pair], point[:, start:end], out=moved[:, :, at])
-        squared = _truncated(camera, moved, links.pixel[block].T)
+        squared = _truncated(camera, moved, segments.pixel[block].T)
         costs[:, first:last] = np.add.reduceat(squared, starts[first:last] - block.start, axis=1)
         first = last
     return costs
 
 
 def _truncated(camera: StereoCamera, moved: FloatArray, pixel: FloatArray) -> FloatArray:
-    """(h, n) squared residuals of links whose points project to moved[:2] / moved[2] (3, h, n) in the left image."""
+    """(h, n) squared residuals of segments whose points project to moved[:2] / moved[2] (3, h, n) in the left image."""
     u, v, depth = moved
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         near = 1.0 / depth

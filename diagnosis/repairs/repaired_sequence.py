@@ -34,10 +34,11 @@ class TrackRepairs:
     """Settings for the repair of tracks."""
 
     gate: float | None = None
-    """px, of a prediction along a track; None for `prediction_gate`"""
+    """px, largest distance of an observation from its prediction along the track; None: estimated"""
     split: bool = True
-    """whether every run of a track that jumps becomes a landmark of its own, or only the longest takes part"""
+    """whether a track that jumps is split into landmarks; otherwise only its longest consistent run is used"""
     mask_copies: bool = True
+    """whether observations equal to those of the previous frame to the bit are masked"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -46,15 +47,18 @@ class Repaired:
 
     sequence: Sequence
     excluded: NDArray[np.uint8]
-    """(n,) an `Excluded` for each of its observations"""
+    """(n,) `Excluded` code of each observation of `sequence`"""
     gate: float
-    """px: how far from its prediction an observation may lie"""
+    """px, largest distance of an observation from its prediction along the track"""
     repairs: tuple[str, ...]
 
 
 def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None = None) -> Repaired:
-    """The recording with velocities in the axes of imu_T_cam and without bias, the extrinsic aligned, disparities
-    without offset, and broken tracks split."""
+    """Applies the significant estimates of a diagnosis to its recording, and masks and splits its tracks.
+
+    Velocities are rotated to the axes of imu_T_cam, scaled, and freed of the gyroscope's bias; the extrinsic is rotated
+    to agree with them; an offset of the disparities is subtracted. `tracks` sets how tracks are repaired.
+    """
     sequence, done = diagnosis.sequence, []
     linear, angular = diagnosis.linear, diagnosis.angular
     bias, angle = significant_bias(diagnosis), significant_misalignment(diagnosis)
@@ -103,23 +107,27 @@ class RepairedTracks(NamedTuple):
     observations: Observations
     n_landmarks: int
     excluded: NDArray[np.uint8]
-    """(n,) an `Excluded` for each observation"""
+    """(n,) `Excluded` code of each observation"""
     gate: float
-    """px: how far from its prediction an observation may lie"""
+    """px, largest distance of an observation from its prediction along the track"""
     repairs: tuple[str, ...]
 
 
 def repaired_tracks(
     sequence: Sequence, path: FloatArray, mask: MaskSettings, tracks: TrackRepairs, sigma: float
 ) -> RepairedTracks:
-    """Tracks split where they jump, and the mask, along a path (T, 4, 4) that is right locally; `sigma` px of noise."""
+    """Tracks split where they jump, and the mask of their observations.
+
+    Observations are predicted along `path` (T, 4, 4), of which only motions over a few frames matter; `sigma` is their
+    noise, px.
+    """
     found = renumbered_tracks(sequence, *_split(sequence, path, mask, tracks))
     tracked = replace(sequence, observations=found.observations, n_landmarks=found.n_landmarks, truth=None)
     return found._replace(excluded=exclude_landmarks(tracked, path, found.excluded, sigma))
 
 
 def _estimated_shift(diagnosis: Diagnosis) -> str:
-    """States the estimate where a usual convention near it is used instead."""
+    """Clause with the estimated shift, where a convention near it was applied in its place; otherwise empty."""
     estimated = diagnosis.timing.shift / float(np.median(diagnosis.sequence.dt))
     text = signed(estimated, 2)
     if "shift_intervals" in diagnosis.overrides or not diagnosis.timing.identifiable:
@@ -132,23 +140,26 @@ def _without_offset(sequence: Sequence, offset: float) -> Sequence:
     return replace(sequence, observations=replace(o, pixel=o.pixel - [0.0, 0.0, offset, 0.0]))
 
 
-def _path(diagnosis: Diagnosis, seen_by_cameras: Odometry | None) -> FloatArray:
-    """(T, 4, 4) a path that is right locally, which is all it is for: what the cameras see, and between two intervals
-    that they see what lies in their middle; elsewhere the velocities."""
+def _path(diagnosis: Diagnosis, visual: Odometry | None) -> FloatArray:
+    """Path (T, 4, 4) along which observations are predicted over a few frames; it drifts.
+
+    An interval has the twist of visual odometry if that is known, the mean of both neighbors' if only these are, and
+    otherwise the repaired velocities.
+    """
     sequence = diagnosis.sequence
     twist = twist_in_imu_axes(zero_order_hold(sequence, diagnosis.shift), diagnosis.linear.name, diagnosis.angular.name)
     twist[:, :3] /= significant_scale(diagnosis)
     twist[:, 3:] -= diagnosis.angular.matrix @ significant_bias(diagnosis)
-    if seen_by_cameras is not None:
-        seen, known = seen_by_cameras.twist(sequence.dt), seen_by_cameras.known
-        twist[known] = seen[known]
+    if visual is not None:
+        visual_twist, known = visual.twist(sequence.dt), visual.known
+        twist[known] = visual_twist[known]
         between = np.flatnonzero(~known[1:-1] & known[:-2] & known[2:]) + 1
-        twist[between] = 0.5 * (seen[between - 1] + seen[between + 1])
+        twist[between] = 0.5 * (visual_twist[between - 1] + visual_twist[between + 1])
     return dead_reckoned_path(twist * sequence.dt[:, None])
 
 
 def _split(sequence: Sequence, path: FloatArray, mask: MaskSettings, tracks: TrackRepairs) -> tuple[SplitTracks, float]:
-    """Tracks cut where they jump, what excludes their observations, and the gate by which they were judged."""
+    """Tracks split where they jump, with their mask, and the gate, px."""
     o = sequence.observations
     copied = np.zeros(len(o), dtype=np.bool_)
     before, after = consecutive(sequence)
@@ -157,9 +168,9 @@ def _split(sequence: Sequence, path: FloatArray, mask: MaskSettings, tracks: Tra
         copied[after[same]] = True
     gate = tracks.gate
     if gate is None:
-        links, usable = TrackConsistency(sequence, path, mask.prediction_gate), is_usable(sequence)
+        consistency, usable = TrackConsistency(sequence, path, mask.prediction_gate), is_usable(sequence)
         checked = usable[before] & usable[after] & ~same
-        gate = prediction_gate(links.error(before[checked], after[checked]))
+        gate = prediction_gate(consistency.error(before[checked], after[checked]))
     split = split_tracks(sequence, TrackConsistency(sequence, path, gate), mask, copied)
     if not tracks.split:
         split.excluded[split.landmark != o.landmark] = Excluded.PREDICTION
@@ -168,7 +179,7 @@ def _split(sequence: Sequence, path: FloatArray, mask: MaskSettings, tracks: Tra
 
 
 def renumbered_tracks(sequence: Sequence, split: SplitTracks, gate: float) -> RepairedTracks:
-    """Observations under the landmarks of a split, in their order; `gate` px is the one it was made with."""
+    """Observations and mask of split tracks, sorted by frame and new landmark; `gate`, px, is that of the split."""
     o = sequence.observations
     order = np.lexsort((split.landmark, o.frame))
     moved = Observations(o.frame[order], split.landmark[order], o.pixel[order])
@@ -180,7 +191,7 @@ def renumbered_tracks(sequence: Sequence, split: SplitTracks, gate: float) -> Re
 
 
 def truth_of_landmarks(truth: Truth | None, n_landmarks: int) -> Truth | None:
-    """The truth, with landmarks of unknown position for the new tracks of a split."""
+    """Ground truth with a row of NaN for each landmark that a split has added."""
     if truth is None or truth.landmarks is None:
         return truth
     missing = np.full((n_landmarks - len(truth.landmarks), 3), np.nan)

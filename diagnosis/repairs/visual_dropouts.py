@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from fgbaseline.data.observations import BoolArray, IntArray, Observations
 from fgbaseline.geometry import FloatArray
 
-from ..odometry.stereo_odometry import MIN_LINKS
+from ..odometry.stereo_odometry import MIN_SEGMENTS
 
 MAX_MARGIN = 8
 """intervals to each side"""
@@ -41,7 +41,7 @@ def dropout_intervals(observations: Observations, n_frames: int) -> BoolArray:
     frame, landmark = observations.frame[order], observations.landmark[order]
     linked = (landmark[:-1] == landmark[1:]) & (frame[:-1] + 1 == frame[1:])
     count = np.bincount(frame[:-1][linked], minlength=n_frames - 1)
-    return np.asarray(count < MIN_LINKS, dtype=np.bool_)
+    return np.asarray(count < MIN_SEGMENTS, dtype=np.bool_)
 
 
 def averaged_over_dropouts(

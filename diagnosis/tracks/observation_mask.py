@@ -33,7 +33,7 @@ class MaskSettings:
     """observations of a track after masking, so that each can be checked against two others"""
 
 
-class LinkTest(Protocol):
+class ConsistencyTest(Protocol):
     """Test whether two observations of a track agree on one static point."""
 
     def agree(self, before: IntArray, after: IntArray) -> BoolArray:
@@ -48,8 +48,8 @@ def exclusions(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettin
     run continues. Of each track the longest run is used (ties: the first), since a track that jumps has changed its
     point.
     """
-    links = TrackConsistency(sequence, world_T_imu, settings.prediction_gate)
-    runs = _runs(sequence, links, settings, np.zeros(len(sequence.observations), dtype=np.bool_))
+    test = TrackConsistency(sequence, world_T_imu, settings.prediction_gate)
+    runs = _runs(sequence, test, settings, np.zeros(len(sequence.observations), dtype=np.bool_))
     excluded, kept, landmark = runs.excluded, runs.kept, sequence.observations.landmark
     in_longest = _longest_run_of_each_track(landmark[kept], runs.run)
     excluded[kept[~in_longest]] = Excluded.PREDICTION
@@ -83,13 +83,13 @@ class SplitTracks:
     """(n,) an `Excluded` each"""
 
 
-def split_tracks(sequence: Sequence, links: LinkTest, settings: MaskSettings, copied: BoolArray) -> SplitTracks:
+def split_tracks(sequence: Sequence, test: ConsistencyTest, settings: MaskSettings, copied: BoolArray) -> SplitTracks:
     """Tracks split at jumps: every run of at least `min_track` observations is a landmark of its own.
 
-    `links` tests two observations of a track; `copied` (n,) marks observations that repeat the frame before. The
+    `test` tests two observations of a track; `copied` (n,) marks observations that repeat the frame before. The
     longest run of a track keeps its number.
     """
-    runs = _runs(sequence, links, settings, copied)
+    runs = _runs(sequence, test, settings, copied)
     excluded, kept, landmark = runs.excluded, runs.kept, sequence.observations.landmark.copy()
     length = np.bincount(runs.run)
     long_enough = length >= settings.min_track
@@ -113,7 +113,7 @@ class _Runs:
     """the run of each of these, increasing"""
 
 
-def _runs(sequence: Sequence, links: LinkTest, settings: MaskSettings, copied: BoolArray) -> _Runs:
+def _runs(sequence: Sequence, test: ConsistencyTest, settings: MaskSettings, copied: BoolArray) -> _Runs:
     o = sequence.observations
     excluded = np.zeros(len(o), dtype=np.uint8)
     excluded[np.abs(o.pixel[:, 1] - o.pixel[:, 3]) > settings.max_row_mismatch] = Excluded.ROWS
@@ -121,9 +121,9 @@ def _runs(sequence: Sequence, links: LinkTest, settings: MaskSettings, copied: B
     excluded[copied] = Excluded.COPIED
     order = o.by_track()
     order = order[excluded[order] == Excluded.NO]
-    kept, lone = _without_lone_outliers(links, o.landmark, order)
+    kept, lone = _without_lone_outliers(test, o.landmark, order)
     excluded[lone] = Excluded.PREDICTION
-    run = np.cumsum(np.r_[True, ~links.agree(kept[:-1], kept[1:])]) - 1 if len(kept) else kept
+    run = np.cumsum(np.r_[True, ~test.agree(kept[:-1], kept[1:])]) - 1 if len(kept) else kept
     return _Runs(excluded, kept, run)
 
 
@@ -162,14 +162,14 @@ class TrackConsistency:
         return agree
 
 
-def _without_lone_outliers(links: LinkTest, landmark: IntArray, order: IntArray) -> tuple[IntArray, IntArray]:
+def _without_lone_outliers(test: ConsistencyTest, landmark: IntArray, order: IntArray) -> tuple[IntArray, IntArray]:
     """`order` without the observations that disagree with both neighbors while these agree, and those taken out."""
     taken_out: list[IntArray] = []
     while len(order) >= 3:
         before, middle, after = order[:-2], order[1:-1], order[2:]
         one_track = landmark[before] == landmark[after]
-        candidate = one_track & ~links.agree(before, middle) & ~links.agree(middle, after)
-        candidate[candidate] = links.agree(before[candidate], after[candidate])
+        candidate = one_track & ~test.agree(before, middle) & ~test.agree(middle, after)
+        candidate[candidate] = test.agree(before[candidate], after[candidate])
         if not candidate.any():
             break
         out = np.r_[False, candidate, False]

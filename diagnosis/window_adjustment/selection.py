@@ -61,7 +61,7 @@ def windows_of(
     """
     deviation = np.zeros_like(twist) if deviation is None else deviation
     o, dt = sequence.observations, sequence.dt
-    chain = track_chains(odometry.links.before, odometry.links.after, odometry.inlier, o)
+    chain = track_chains(odometry.segments.before, odometry.segments.after, odometry.inlier, o)
     known = odometry.known[:, None, None]
     step = np.where(known, odometry.motion, se3.exp(twist * dt[:, None]))
     starts, before = o.frame_starts(sequence.n_frames), 0

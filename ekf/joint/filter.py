@@ -71,7 +71,7 @@ class JointFilter:
         self.innovations = Innovations.none(problem.n_frames)
 
     def process_frame(self, k: int, observed: slice) -> None:
-        """Process frame k with its observations, a slice of the problem's."""
+        """Process frame k, whose observations are the slice `observed` of `problem.observations()`."""
         index = np.arange(observed.start, observed.stop)
         row = self.feature[index]
         self.map.last_seen[row] = k
@@ -87,7 +87,8 @@ class JointFilter:
             self._initialize_from_prior(row[self._select(k, index, at_prior)])
         new = absent & ~at_prior
         wanted = new & self._update(k, index[self.state.slot_of[row] != ABSENT])
-        if self.settings.coordinates is LandmarkRepresentation.WORLD:  # which cannot represent a point at infinity
+        if self.settings.coordinates is LandmarkRepresentation.WORLD:
+            # A world point is at a finite distance, so its disparity is positive.
             wanted &= self.measured[index, 0] > self.measured[index, 1]
         if (wanted != new).any():
             self._record_rejection(k, EventKind.INITIALIZATION_DEFERRED, ~wanted[new])
@@ -128,8 +129,8 @@ class JointFilter:
     def _update(self, k: int, index: IntArray) -> bool:
         """Update with observations `index` (n,) of active landmarks; return whether the pose may initialize new ones.
 
-        False if the whole frame is rejected or S is not positive definite, as pose and landmarks are then those of the
-        prediction. True otherwise, also where every observation was rejected by itself.
+        False if the frame is rejected as a whole or S is not positive definite: the state is then only predicted. True
+        otherwise, also where the gate rejects every single observation.
         """
         if len(index) == 0:
             return True
@@ -139,27 +140,27 @@ class JointFilter:
         state = self.state
         variance = self._variance(linearized)
         innovation = Innovation.of(linearized.H, linearized.residual, state.P)
-        verdict = self._gate(innovation.nis_per_observation(variance))
-        order = verdict.order
-        as_observed, innovation = innovation, innovation.in_order(order)
+        gated = self._gate(innovation.nis_per_observation(variance))
+        order = gated.order
+        unordered, innovation = innovation, innovation.in_order(order)
         factor = self._record_nis(k, innovation, variance[order])
-        if verdict.rejection is not EventKind.FRAME_DISAGREES:
+        if gated.rejection is not EventKind.FRAME_DISAGREES:
             self.process_noise.reset()
-        # one such frame is more often one of wrong matches
-        elif self.process_noise.n_rejected > 0 and (retried := self._inflate_process_noise(k, as_observed, variance)):
-            innovation, verdict = retried
-            order, factor = verdict.order, None
+        # Only after a second frame in succession: a single one more often has wrong matches than unmodeled motion.
+        elif self.process_noise.n_rejected > 0 and (retried := self._inflate_process_noise(k, unordered, variance)):
+            innovation, gated = retried
+            order, factor = gated.order, None
             innovation = innovation.in_order(order)
             self.process_noise.reset()
         else:
             self.process_noise.n_rejected += 1
         variance = variance[order]
-        if verdict.rejection is not None:
-            self._record_rejection(k, verdict.rejection, ~verdict.accepted)
-            if not verdict.accepted.any():
-                return verdict.rejection is not EventKind.FRAME_DISAGREES
+        if gated.rejection is not None:
+            self._record_rejection(k, gated.rejection, ~gated.accepted)
+            if not gated.accepted.any():
+                return gated.rejection is not EventKind.FRAME_DISAGREES
         try:
-            weight = verdict.weight[order][: np.count_nonzero(verdict.accepted), None]
+            weight = gated.weight[order][: np.count_nonzero(gated.accepted), None]
             innovation, variance = innovation.first(len(weight)), variance[: len(weight)]
             if factor is None:
                 factor = innovation.factorize(variance / weight)
@@ -169,16 +170,20 @@ class JointFilter:
                 factor = factor.reweighted(innovation.residual, added)
             self._apply_correction(kalman_update(innovation, factor, state.P))
         except NotPositiveDefiniteError:
-            self._record_rejection(k, EventKind.COVARIANCE_LOST, verdict.accepted)
+            self._record_rejection(k, EventKind.COVARIANCE_LOST, gated.accepted)
             return False
-        self.used[linearized.observed[verdict.accepted]] = True
+        self.used[linearized.observed[gated.accepted]] = True
         if not state.P.diagonal().min() >= 0.0:
             negative = "P - W^T W has a negative variance after the update"
             self.events.append(Event(k, EventKind.COVARIANCE_LOST, negative))
         return True
 
     def _variance(self, linearized: _LinearizedObservations) -> FloatArray:
-        """Variances (n, r) of the noise of innovations, with the squares of second-order terms for one camera."""
+        """Variances (n, r), px^2, of the noise of innovations.
+
+        For one camera those of the neglected second-order terms are added, and the square of their mean, which the
+        innovation is not corrected for.
+        """
         if not self.measurement.monocular:
             return np.broadcast_to(self.row_variance, linearized.residual.shape)
         terms = second_order_of(self.camera, self.cam_T_imu, self.state, linearized.H.slot)
@@ -187,7 +192,7 @@ class JointFilter:
     def _inflate_process_noise(
         self, k: int, innovation: Innovation, variance: FloatArray
     ) -> tuple[Innovation, GatedObservations] | None:
-        """Retry a rejected frame under inflated process noise, which P then has; None if it is still rejected.
+        """Retry a rejected frame with inflated process noise in P; None, with P unchanged, if it is still rejected.
 
         Two successive frames disagree with the prediction: where this frame's observations agree with each other, the
         motion between the frames is less certain than modeled.
@@ -203,7 +208,7 @@ class JointFilter:
         return gate_observations(nis, self.measurement, self.settings)
 
     def _record_nis(self, k: int, innovation: Innovation, variance: FloatArray) -> CholeskyFactor | None:
-        """Record the NIS of the frame, before kernel and gate, and return the factor of S."""
+        """Record the NIS of the frame, before kernel and gate; return the factor of S, or None if S has none."""
         self.innovations.degrees[k] = innovation.residual.size
         try:
             factor = innovation.factorize(variance)
@@ -215,16 +220,14 @@ class JointFilter:
     def _linearize(self, index: IntArray) -> _LinearizedObservations:
         state, slot = self.state, self.state.slot_of[self.feature[index]]
         charts = state.charts[slot]
-        at_first_estimates = latest = predict(
-            self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot])
-        )
-        if self.settings.linearization is Linearization.FIRST_ESTIMATE:  # Jacobians at these, residuals at the latest
-            at_first_estimates = predict(
+        linearized = latest = predict(self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot]))
+        if self.settings.linearization is Linearization.FIRST_ESTIMATE:  # of the Jacobians only, not of the residuals
+            linearized = predict(
                 self.camera, self.cam_T_imu, state.predicted.pose, homogeneous(charts, state.first_estimate[slot])
             )
-        H_pose, H_point = at_first_estimates.pose_jacobian(), at_first_estimates.point_jacobian()
+        H_pose, H_point = linearized.pose_jacobian(), linearized.point_jacobian()
         H = StackedJacobian(slot, H_pose, H_point @ charts[:, :, :3], state.n_body)
-        cosine = np.minimum(latest.cosine, at_first_estimates.cosine)
+        cosine = np.minimum(latest.cosine, linearized.cosine)
         return _LinearizedObservations(index, H, self.measured[index] - latest.pixel, cosine)
 
     def _reject_behind_camera(self, k: int, linearized: _LinearizedObservations) -> _LinearizedObservations:
@@ -245,11 +248,11 @@ class JointFilter:
         state, n = self.state, self.state.n_body
         before = state.body
         state.body = before.corrected(delta[:n])
-        by = delta[n:].reshape(-1, 3)
+        steps = delta[n:].reshape(-1, 3)
         if self.settings.linearization is not Linearization.INVARIANT:
-            state.xi[:] += by
+            state.xi[:] += steps
         else:
-            landmarks = state.correct_landmarks(by).reshape(-1, POSE) @ se3.adjoint(before.pose)
+            landmarks = state.correct_landmarks(steps).reshape(-1, POSE) @ se3.adjoint(before.pose)
             state.transform_covariance(np.concatenate([transform_columns(before, state.body, delta[:n]), landmarks]))
 
     def _initialize_from_prior(self, row: IntArray) -> None:
@@ -262,10 +265,10 @@ class JointFilter:
     def _initialize_from_observation(self, index: IntArray) -> None:
         """Initialize landmarks from one observation each, back-projected from the current pose estimate.
 
-        This is the limit of a prior without information: from 0 = H_pose delta + H_xi e + n, with n the error of the
-        pixels, the error of the coordinates is e = -H_xi^-1 H_pose delta - H_xi^-1 n. For one camera a third row is a
-        pseudo-measurement: each inverse depth is that of the scene (`inverse_depth_prior`), with an error that the new
-        landmarks have in common.
+        The limit of an update with an uninformative prior: with delta the error of the pose, e that of the coordinates
+        and n that of the pixels, 0 = H_pose delta + H_xi e + n gives e = -H_xi^-1 (H_pose delta + n). One camera lacks
+        a third row; a pseudo-measurement of the inverse depth takes its place, the mean of the scene
+        (`inverse_depth_prior`), whose error all new landmarks share.
         """
         n, state = len(index), self.state
         first_estimate = self.settings.linearization is Linearization.FIRST_ESTIMATE
@@ -274,22 +277,22 @@ class JointFilter:
         scene = None if prior is None else scene_depth(prior, state, self.cam_T_imu)
         points = back_projected(self.camera, self.measured[index], np.nan if scene is None else scene.mean)
         points = points @ world_T_cam.T
-        shared = chart(self.settings.coordinates, world_T_cam)
-        xi = coordinates_of(shared, points)
-        at = state.predicted.pose if first_estimate else state.pose
-        seen = predict(self.camera, self.cam_T_imu, at, xi @ shared[:, :3].T + shared[:, 3])
+        new_chart = chart(self.settings.coordinates, world_T_cam)
+        xi = coordinates_of(new_chart, points)
+        pose = state.predicted.pose if first_estimate else state.pose
+        predicted = predict(self.camera, self.cam_T_imu, pose, xi @ new_chart[:, :3].T + new_chart[:, 3])
         r = self.measurement.n_rows
-        H_xi = (seen.point_jacobian().reshape(r * n, 4) @ shared[:, :3]).reshape(n, r, 3)
-        H_pose, variance, common = seen.pose_jacobian(), self.row_variance, None
+        H_xi = (predicted.point_jacobian().reshape(r * n, 4) @ new_chart[:, :3]).reshape(n, r, 3)
+        H_pose, variance, common = predicted.pose_jacobian(), self.row_variance, None
         if scene is not None:
-            _, by_pose, by_xi = inverse_depths(at, self.cam_T_imu, np.broadcast_to(shared, (n, 4, 4)), xi)
+            _, by_pose, by_xi = inverse_depths(pose, self.cam_T_imu, np.broadcast_to(new_chart, (n, 4, 4)), xi)
             H_pose, H_xi = (np.concatenate(H, axis=1) for H in ((H_pose, by_pose[:, None]), (H_xi, by_xi[:, None])))
             variance = np.append(variance, (scene.spread * scene.mean) ** 2)
         inverse = np.linalg.inv(H_xi)
         covariance = (inverse * variance) @ np.swapaxes(inverse, 1, 2)
         if scene is not None:
             common = CommonError(np.asarray(scene.mean * inverse[:, :, r]), scene.covariance, scene.variance)
-        state.initialize(self.feature[index], shared, xi, -inverse @ H_pose, covariance, common)
+        state.initialize(self.feature[index], new_chart, xi, -inverse @ H_pose, covariance, common)
         self.map.initialized[self.feature[index]] = True
         self.used[index] = True
 

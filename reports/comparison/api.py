@@ -95,12 +95,37 @@ def compare_trajectories(
 
     Raises InputError, in one sentence, for an invalid trajectory or keyword. No argument is changed.
     """
-    options = {name: value for name, value in locals().items() if name not in ("reference", "estimates")}
     from .sources import ARRAYS, by_name, opened
 
     every = [opened(each, form, name) for name, each in by_name(estimates)]
     first = opened(reference, form, "reference") if isinstance(reference, ARRAYS) else reference
-    return compare(first, *every, **options)
+    return compare(
+        first,
+        *every,
+        align=align,
+        align_first=align_first,
+        up=up,
+        association=association,
+        tolerance=tolerance,
+        offset=offset,
+        search_offset=search_offset,
+        deltas=deltas,
+        all_pairs=all_pairs,
+        form=form,
+        times=times,
+        time_unit=time_unit,
+        quaternion=quaternion,
+        lever_arm=lever_arm,
+        align_body=align_body,
+        sequence=sequence,
+        landmarks=landmarks,
+        held_out=held_out,
+        reference_body=reference_body,
+        estimate_body=estimate_body,
+        extrinsic=extrinsic,
+        beside=beside,
+        seed=seed,
+    )
 
 
 def compare(

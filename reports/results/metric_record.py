@@ -25,7 +25,7 @@ class Value(NamedTuple):
 
     @property
     def text(self) -> str:
-        """`0.52 [0.41, 0.66]`, the value alone, or a dash."""
+        """Text `0.52 [0.41, 0.66]`; the value alone without an interval, a dash for NaN."""
         return interval(self.value, self.low, self.high)
 
     def __bool__(self) -> bool:
@@ -66,25 +66,25 @@ class Metric:
     scale: float = 1.0
     """value in a table over that in the results"""
     term: str = ""
-    """term of the glossary, where it is not the group"""
+    """term of the glossary; empty: the group"""
     brief: str = ""
-    """heading on the terminal and in a bench, where it is not the group"""
+    """heading on the terminal and in a bench; empty: the group"""
     name: str = ""
-    """column of a bench's CSV tables; empty: none"""
+    """column in the CSV files of a bench; empty: the bench leaves the metric out"""
     ranked: bool = False
-    """whether a bench ranks by it: it measures accuracy"""
+    """whether a bench ranks estimators by the metric, which then measures accuracy"""
     same_data: bool = False
-    """whether it is taken over the same data for all, so that it says which is best whatever each one covers"""
+    """whether all estimators are measured on the same data, so that the best one may be marked at any coverage"""
     uneven_only: bool = False
-    """whether it stands in a run's table only where the estimators do not cover the same frames"""
+    """whether a run's table has the metric only if the estimators cover different frames"""
     nonzero_only: bool = False
-    """whether it stands in a run's table only where it is not 0 for all"""
+    """whether a run's table has the metric only if it is not 0 for all estimators"""
     count: bool = False
-    """whether it is a whole number"""
+    """whether the value is an integer"""
     measure: "Callable[[Run, Result], float] | None" = None
-    """its value, where no model of the results has it"""
+    """computes the value of a metric that is not a field of the result models"""
     absent: str = ""
-    """why what it measures may be missing"""
+    """reason to state where the value is missing"""
 
     @property
     def key(self) -> str:
@@ -98,7 +98,7 @@ class Metric:
 
     @property
     def glossary_term(self) -> str:
-        """Term of the glossary that explains it; empty where there is none."""
+        """Term of the glossary that defines the metric; empty if there is none."""
         term = self.term or self.group
         return term if term in TERMS else ""
 
@@ -113,25 +113,25 @@ class Metric:
         return f"{self.short}, {self.unit}" if self.unit else self.short
 
     def text(self, value: float, resolution: float = RESOLUTION) -> str:
-        """A value of it, without its unit; 0 with the resolution for rounding."""
+        """Value as text, without unit; below `resolution` that it is less than this (`resolved`)."""
         if self.is_rounding(value, resolution):
             return resolved(value, resolution)
         return number(int(value) if self.count and isfinite(value) else value)
 
     def is_rounding(self, value: float, resolution: float = RESOLUTION) -> bool:
-        """Whether a distance, an angle or what is normalized is not zero, and too small to mean anything.
+        """Whether a value in m, ° or without a unit is above zero, but below the resolution, hence rounding error.
 
-        A small ratio of sigmas means something: the estimator is overconfident.
+        A ratio of sigmas is exempt: a small one means that the estimator is overconfident.
         """
         return self.unit in ("m", "°", "") and self.term != "sigma ratio" and 0.0 < abs(value) < resolution
 
     def value(self, results: Mapping[str, Any]) -> Value:
-        """Its value in the results of one estimator."""
+        """Value, with its interval, in the results of one estimator, in the unit of the tables."""
         return Value(*(self.scale * part for part in value_at(results, *self.path)))
 
 
 def value_at(results: Mapping[str, Any], *path: str) -> Value:
-    """The number at a path, or the mapping there with `value`, `low` and `high`."""
+    """Value at a key path of results: of a number, or of a mapping with `value`, `low` and `high`; NaN if missing."""
     found = at(results, *path)
     parts = [found.get(key) for key in Value._fields] if isinstance(found, Mapping) else [found]
     return Value(*map(_float, parts))

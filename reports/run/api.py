@@ -39,10 +39,6 @@ from .problem import (
 )
 from .report import RunReport
 
-AS_GIVEN = ("preset", "features", "truth_frame", "truth_up", "as_recorded", "held_out", "seed", "cameras")
-OF_ADDED = ("add_body", "add_time_unit", "add_offset")
-FILES = ("imu", "imu_calibration", "velocities", "extrinsic", "right", "calibration", "times", "repairs")
-"""keywords that become settings of the same name: as they are, and as paths"""
 Solver: TypeAlias = Callable[..., object]
 """`solve(problem, progress=None) -> Estimate`; another return value becomes a row that failed, with the reason"""
 
@@ -122,22 +118,38 @@ def run(
     Raises InputError, in one sentence, for an invalid recording or keyword. An estimator that raises an exception
     becomes a failed result; the others go on.
     """
-    keywords = locals()
     names, functions = named_estimators(() if estimators is None else estimators)
     is_default = estimators is None or (bool(names) and len(functions) == len(names))
     chosen = RunSettings(
         sequence=as_path(recording),
+        preset=preset,
         estimators=(*DEFAULT_ESTIMATORS, *names) if is_default else names,
         batch_up_to=BATCH_OBSERVATIONS if is_default else 0,
         functions=functions,
+        features=features,
         landmarks=LandmarkMode(landmarks),
         truth=_truth_source(truth),
+        truth_frame=truth_frame,
+        truth_up=truth_up,
+        as_recorded=as_recorded,
+        imu=as_path(imu),
+        imu_calibration=as_path(imu_calibration),
+        velocities=as_path(velocities),
+        extrinsic=as_path(extrinsic),
+        cameras=cameras,
+        right=as_path(right),
+        calibration=as_path(calibration),
+        times=as_path(times),
         time_unit=None if time_unit is None else TimeUnit(time_unit),
         topics=names_in(topics) if isinstance(topics, str) else tuple(topics),
         tracker=as_path(settings),
+        repairs=as_path(repairs),
+        held_out=held_out,
+        seed=seed,
         add=tuple(opened(each, name=name) for name, each in by_name(add)),
-        **{name: keywords[name] for name in (*AS_GIVEN, *OF_ADDED)},
-        **{name: as_path(keywords[name]) for name in FILES},
+        add_body=add_body,
+        add_time_unit=add_time_unit,
+        add_offset=add_offset,
     )
     check_estimators(chosen.estimators, chosen.functions)
     sequence = read_sequence(chosen)

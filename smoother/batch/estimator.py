@@ -88,7 +88,7 @@ def _solve(problem: Problem, answer: Estimate, *, both: bool) -> Estimate:
                 seconds_total=time.perf_counter() - start,
                 events=(*events, _costs(minima, T - 1, both=both)),
             )
-            return states.answer(estimate)
+            return states.added_to(estimate)
         # A cheirality violation has no gradient and a meaningless residual: costs with it are not comparable.
         events += [Event(T - 1, EventKind.LANDMARK_DROPPED, CHEIRALITY_VIOLATION, j) for j in gone]
         used = used & ~np.isin(problem.sequence.observations.landmark, gone)

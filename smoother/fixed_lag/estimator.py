@@ -68,7 +68,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: FixedLagSettin
         seconds_total=time.perf_counter() - start,
         events=tuple(events),
     )
-    return window.states.answer(estimate)
+    return window.states.added_to(estimate)
 
 
 def _run(builder: GraphBuilder, window: FixedLagWindow, seconds: FloatArray, progress: Progress | None) -> list[Event]:

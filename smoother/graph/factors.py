@@ -1,4 +1,4 @@
-"""GTSAM factors of a problem, with the likelihood of the filters.
+"""GTSAM factors of a problem, with the noise models that the filters have.
 
 `StereoPoint2` has the rows (uL, uR, v) of `geometry.measurement_model`, with their variances; one camera has (uL, v).
 """
@@ -17,7 +17,7 @@ from .inertial_factors import InertialFactors
 from .keys import pose_key
 
 FIXED_POSE_SIGMA = 1e-6
-"""unit lengths of the camera, and rad: sigma of a fixed pose in place of zero, so that Cholesky can be used"""
+"""sigma of a fixed pose, in unit lengths of the camera and rad: not zero, so that Cholesky can be used"""
 
 
 class FactorBuilder:
@@ -41,7 +41,7 @@ class FactorBuilder:
 
     @property
     def fixed_pose_sigmas(self) -> FloatArray:
-        """Standard deviations (6,), rad and m, of a fixed pose."""
+        """Sigmas (6,) of a fixed pose in GTSAM's order: rotation, rad, then translation, m."""
         return FIXED_POSE_SIGMA * np.repeat([1.0, self.problem.sequence.camera.unit_length], 3)
 
     def start_prior(self) -> gtsam.NonlinearFactor:
@@ -74,7 +74,10 @@ class FactorBuilder:
         return gtsam.BetweenFactorPose3(pose_key(frame), pose_key(frame + 1), step, noise)
 
     def observation(self, frame: int, key: int, rows: Iterable[float]) -> gtsam.NonlinearFactor:
-        """Factor of the rows uL, uR, v, or uL, v (r,), px, of the landmark `key`; does not throw on cheirality."""
+        """Factor of the rows (r,), px, of an observation of the landmark `key`: uL, uR, v, or uL, v of one camera.
+
+        It does not throw where the point is behind the camera: residual and Jacobian then say nothing (`cheirality`).
+        """
         noise, pose, no_throw = self.pixel_noise, pose_key(frame), (False, False)
         if self._stereo is None:
             pixel = np.array([*rows])
@@ -83,7 +86,7 @@ class FactorBuilder:
         return gtsam.GenericStereoFactor3D(point, noise, pose, key, self._stereo, *no_throw, self.imu_P_cam)
 
     def landmark_prior(self, landmark: int, key: int) -> gtsam.PriorFactorPoint3:
-        """Prior factor of one landmark with key `key`."""
+        """Prior factor of the landmark of index `landmark` in the sequence, a variable `key` of the graph."""
         prior = self.problem.landmark_prior
         assert prior is not None
         row = int(np.searchsorted(self.problem.features, landmark))

@@ -124,13 +124,13 @@ class FrameStates:
         for field in fields(self):
             getattr(self, field.name)[:first] = getattr(other, field.name)[:first]
 
-    def answer(self, estimate: Estimate) -> Estimate:
+    def added_to(self, estimate: Estimate) -> Estimate:
         """Estimate with these states and their covariances."""
-        answer = replace(estimate, world_T_imu=self.world_T_imu, covariance=self.covariance[:, POSE, POSE])
+        states = replace(estimate, world_T_imu=self.world_T_imu, covariance=self.covariance[:, POSE, POSE])
         if not self.inertial:
-            return answer
+            return states
         return replace(
-            answer,
+            states,
             velocity=self.velocity,
             gyroscope_bias=self.bias[:, :3],
             accelerometer_bias=self.bias[:, 3:],

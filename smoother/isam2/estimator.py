@@ -21,15 +21,15 @@ from .settings import ISAM2Settings
 
 
 def isam2(problem: Problem, progress: Progress | None = None, settings: ISAM2Settings | None = None) -> Estimate:
-    """Incremental smoothing over the whole graph: every pose from all of the data.
+    """Incremental smoothing with iSAM2 (Kaess et al., 2012): the estimate of every pose uses the whole recording.
 
     A landmark is initialized once its geometry is determined, with all its observations. Where the system is
     indeterminate, its landmark or the frame's observations are dropped, with an event; the status is then
     `recovered`. `by_products["isam2-online"]` is pose k as estimated from data up to k.
     """
     with threadpool_limits(limits=1, user_api="blas"):
-        posed, world_T_solver = in_solver_frame(problem)
-        return _solve(posed, progress, settings or ISAM2Settings.of(problem)).transformed(world_T_solver)
+        centered, world_T_solver = in_solver_frame(problem)
+        return _solve(centered, progress, settings or ISAM2Settings.of(problem)).transformed(world_T_solver)
 
 
 def isam2_online(problem: Problem, progress: Progress | None = None) -> Estimate:
@@ -71,7 +71,7 @@ def _solve(problem: Problem, progress: Progress | None, settings: ISAM2Settings)
         events=events,
     )
     final = replace(online, name="isam2", landmarks=landmarks, seconds_total=time.perf_counter() - start)
-    return _with_by_product(states.answer(final), smoother.builder.online.answer(online))
+    return _with_by_product(states.added_to(final), smoother.builder.online.added_to(online))
 
 
 def _run(
@@ -88,9 +88,11 @@ def _run(
     where = quick.n_frames
     smoother = IncrementalSmoother(problem, replace(settings, qr=True))
     smoother.run(seconds, progress)
-    # Online, the frames before the failure were known by Cholesky.
+    # The causal estimates of the frames before the failure are those of the first run, by Cholesky.
     smoother.builder.online.replace_before(where, quick.builder.online)
-    smoother.events.append(Event(where, EventKind.SOLVED_BY_QR, "Cholesky failed there: pivots of very unequal size"))
+    smoother.events.append(
+        Event(where, EventKind.SOLVED_BY_QR, "Cholesky failed at this frame: pivots of very unequal size")
+    )
     return smoother
 
 
@@ -109,7 +111,9 @@ def _final_solution(
             break
     if failure:
         last = smoother.problem.n_frames - 1
-        smoother.events.append(Event(last, EventKind.RELINEARIZATION_FAILED, f"{failure}; the step before stands"))
+        smoother.events.append(
+            Event(last, EventKind.RELINEARIZATION_FAILED, f"{failure}; the solution before that step is kept")
+        )
     return graph, values
 
 

@@ -35,7 +35,7 @@ class FrameLostError(Exception):
     """Cholesky would lose a frame's observations; QR may keep them."""
 
     def __init__(self, frame: int) -> None:
-        super().__init__(f"frame {frame}")
+        super().__init__(f"Cholesky would lose the observations of frame {frame}")
         self.frame = frame
 
 
@@ -47,6 +47,7 @@ class IncrementalSmoother:
         self._settings = settings
         self.problem = problem
         self._may_lose_frames = settings.qr or problem.landmark_prior is not None
+        """whether a frame without its observations is accepted, as QR would not keep them either"""
         self.builder = GraphBuilder(problem, settings.initialization)
         self._inertial = problem.imu is not None
         if problem.sequence.monocular:
@@ -85,12 +86,12 @@ class IncrementalSmoother:
                 progress(k + 1, T)
 
     def settle(self) -> None:
-        """Update without new factors after the last frame, until every variable is within its threshold."""
+        """Update without new factors after the last frame, until no variable exceeds its relinearization threshold."""
         for _ in range(FINAL_UPDATES):
             try:
                 if self.solver.relinearize() == 0:
                     return
-            except IndeterminateSystemError:  # the tree is unchanged, which is good enough
+            except IndeterminateSystemError:  # GTSAM failed before it changed the tree: its solution remains
                 return
 
     def _process_frame(self, k: int, observed: range) -> None:
@@ -126,15 +127,16 @@ class IncrementalSmoother:
         self._no_relin_keys = gtsam.KeyList()
 
     def _with_restored_tree(self, update: FrameUpdate) -> FrameUpdate:
-        """Update after restoring the whole tree, where it refers to marginalized variables.
+        """Restores the marginalized frames if `update` observes marginalized variables; returns the update to apply.
 
-        Where GTSAM fails to restore it, the update without those landmarks.
+        If GTSAM cannot restore them, that is `update` without the landmarks concerned.
         """
-        frame, back = self.builder.frame, {j for j in update.tracked if self.solver.is_marginalized(self.key[j])}
-        back |= {e.landmark for e in update.new_landmarks if frame[e.observations[0]] < self._first}
-        if not back:
+        frame = self.builder.frame
+        marginalized = {j for j in update.tracked if self.solver.is_marginalized(self.key[j])}
+        marginalized |= {e.landmark for e in update.new_landmarks if frame[e.observations[0]] < self._first}
+        if not marginalized:
             return update
-        k, new = update.frame, back - self._dropped
+        k, new = update.frame, marginalized - self._dropped
         if new and self.solver.restore_all(self._ordering.batch_groups(0, k - 1)):
             self._start_tree_at(0)
             # Marginalize again at frame 2k only: the intervals double, so that all earlier restorations together cost
@@ -151,7 +153,7 @@ class IncrementalSmoother:
             for j in sorted(new)
         ]
         self._dropped |= new
-        return update.without(back)
+        return update.without(marginalized)
 
     def _current_poses(self, frames: IntArray) -> FloatArray:
         """Poses (n, 4, 4) of frames (n,) by the last solution of the tree; marginalized ones as estimated online."""
@@ -187,11 +189,11 @@ class IncrementalSmoother:
             owner.append((j, i))
         if update.new_landmarks and not update.tracked:
             self._reinitialization_frames = REINITIALIZATION_FRAMES
-        sighted = [*new.values(), *(self.key[j] for j in update.tracked)]
-        there = [j for j in dropped if j in self.key]
-        removed = [slot for j in there for slot in self._slots[j].values()]
-        self._ordering.remove([self.key[j] for j in there])
-        groups = self._ordering.groups(k, sighted, first=self._first, all_new=self._reinitialization_frames > 0)
+        observed_keys = [*new.values(), *(self.key[j] for j in update.tracked)]
+        present = [j for j in dropped if j in self.key]
+        removed = [slot for j in present for slot in self._slots[j].values()]
+        self._ordering.remove([self.key[j] for j in present])
+        groups = self._ordering.groups(k, observed_keys, first=self._first, all_new=self._reinitialization_frames > 0)
         # first frame of each factor in the order of `graph`: motion, then landmark priors (no pose) and observations
         frames = [max(k - 1, 0), *(NO_POSE if i == PRIOR else self.builder.frame[i] for _, i in owner)]
         relinearize, no_relin_keys = self._relinearization(k)
@@ -202,7 +204,7 @@ class IncrementalSmoother:
             self._ordering.remove(new.values())
             raise
         self._reinitialization_frames = max(0, self._reinitialization_frames - 1)
-        for j in there:
+        for j in present:
             del self.key[j], self._slots[j]
         self.key |= new
         for (j, i), slot in zip(owner, slots[1:], strict=True):
@@ -230,9 +232,9 @@ class IncrementalSmoother:
         GTSAM names a variable near the cause. The cause is usually a cheirality violation of the last solution; only
         without one, the named variable is taken.
         """
-        culprits = [j for j in self._cheirality_violations(self.solver.estimate()) if j not in dropped]
-        if culprits:
-            return dict.fromkeys(culprits, CHEIRALITY_VIOLATION)
+        violations = [j for j in self._cheirality_violations(self.solver.estimate()) if j not in dropped]
+        if violations:
+            return dict.fromkeys(violations, CHEIRALITY_VIOLATION)
         named = None if error.key is None else landmark_of(error.key)
         if named is None or named in dropped or named in self._dropped:
             return {}
@@ -249,9 +251,9 @@ class IncrementalSmoother:
     def release(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
         """Factors in their slots and the solution, after the last frame; frees the tree."""
         graph, values = self.solver.release()
-        there = set(self.key.values())
+        active = set(self.key.values())
         for key in values.keys():  # noqa: SIM118
-            if landmark_of(key) is not None and key not in there:  # dropped, and still in the linear prior
+            if landmark_of(key) is not None and key not in active:  # dropped, but still in the linear prior
                 values.erase(key)
         return graph, values
 

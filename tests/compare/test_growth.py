@@ -53,7 +53,7 @@ def test_without_stamps_there_are_no_metrics_per_second() -> None:
     pair = matched(winding(scale=1.01))
     frames = replace(pair, reference=replace(pair.reference, stamped=False))
     assert "translation per second" not in compare.drift(frames).index
-    with pytest.raises(InputError, match="it has no time stamps, so it has no errors per second"):
+    with pytest.raises(InputError, match="it has no time stamps, which drift and RPE over seconds need"):
         compare.drift(frames, seconds=1.0)
     with pytest.raises(InputError, match="it has no time stamps"):
         compare.relative_errors(frames, 1.0, "s")

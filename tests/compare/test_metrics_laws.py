@@ -276,7 +276,7 @@ def test_the_scale_of_one_camera_is_estimated_and_reported() -> None:
     ("kind", "first", "n", "caption"),
     [
         ("none", None, 0, "not aligned"),
-        ("first-pose", None, 1, "the first pose put on the reference's"),
+        ("first-pose", None, 1, "aligned at the first pose"),
         ("yaw", None, 15, "yaw and position aligned over all 15 poses"),
         ("se3", 15, 15, "SE(3)-aligned over all 15 poses"),
         ("se3", 1, 1, "SE(3)-aligned over the first 1 pose; their positions leave every rotation open"),

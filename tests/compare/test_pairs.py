@@ -123,8 +123,9 @@ def test_errors_of_motions_are_in_the_body_and_of_poses_in_the_world() -> None:
     assert compare.relative_pose_error(estimate, reference, pairs, "distance_percent") == pytest.approx([100.0])
     assert compare.absolute_pose_error(estimate, reference, "translation")[2] == pytest.approx(np.sqrt(5.0))
     assert compare.absolute_pose_error(estimate, reference, "rotation_chord")[1] == pytest.approx(2.0)
-    with pytest.raises(ValueError, match="not one of poses, but of motions"):
-        compare.absolute_pose_error(estimate, reference, "distance_percent")
+    for of_motions in ("distance", "distance_percent"):
+        with pytest.raises(InputError, match=f"{of_motions}: a measure of motions; a pose has translation, "):
+            compare.absolute_pose_error(estimate, reference, of_motions)
 
 
 def test_a_table_of_motions_has_first_frame_and_span_of_each() -> None:

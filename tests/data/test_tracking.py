@@ -129,7 +129,7 @@ def test_the_diagnosis_counts_the_wrong_matches(interval: float, levels: int) ->
         n_landmarks = int(landmark.max()) + 1
         recording = Sequence("room", t, twist[:, :3], twist[:, 3:], CAMERA, IMU_T_CAM, observations, n_landmarks)
         tracks = track_statistics(diagnose(recording))
-        counted = tracks.wrong.sum() / tracks.links.sum()
+        counted = tracks.wrong.sum() / tracks.matches.sum()
         if settings is off:
             assert 0.01 < true < 0.1
             assert 0.5 * true < counted < 2.0 * true

@@ -12,8 +12,8 @@ from fgbaseline.data.problem import Excluded, Problem
 from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 from fgbaseline.diagnosis import AsRecordedSettings, InertialDiagnosis, calibrated, diagnose_inertial, inertial_findings
 from fgbaseline.diagnosis.odometry import epipolar_motion
-from fgbaseline.diagnosis.odometry.epipolar_motion import Links, Motion, epipolar_motions
-from fgbaseline.diagnosis.odometry.monocular_odometry import monocular_odometry, rays, track_links
+from fgbaseline.diagnosis.odometry.epipolar_motion import Motion, RayMatches, epipolar_motions
+from fgbaseline.diagnosis.odometry.monocular_odometry import monocular_odometry, rays, track_pairs
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 SETTINGS = Simulation(path="handheld", duration=8.0, imu=SimulatedImu(), cameras="left", wrong_share=0.0, seed=3)
@@ -50,17 +50,17 @@ def test_jacobians_of_the_epipolar_residual_are_its_finite_differences() -> None
     first = rng.normal(size=(8, 3))
     second = first + 0.1 * rng.normal(size=first.shape)
     first, second = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in (first, second))
-    links, t = Links(np.zeros(8, np.int64), first, second), np.array([[0.6, 0.0, 0.8]])
+    matches, t = RayMatches(np.zeros(8, np.int64), first, second), np.array([[0.6, 0.0, 0.8]])
     R = so3.exp_so3(0.3 * rng.normal(size=(1, 3)))
 
     def residuals(delta: FloatArray) -> FloatArray:
         moved = t + (epipolar_motion._basis(t) @ delta[3:, None])[:, :, 0]
         motion = Motion(R @ so3.exp_so3(delta[None, :3]), moved / np.linalg.norm(moved))
-        return epipolar_motion._residuals(links, motion)[0]
+        return epipolar_motion._residuals(matches, motion)[0]
 
     slopes = [(residuals(1e-6 * e) - residuals(-1e-6 * e)) / 2e-6 for e in np.eye(5)]
     for i, weight in enumerate(np.eye(8)):
-        _, gradient = epipolar_motion._normal_equations(links, Motion(R, t), weight, 1)
+        _, gradient = epipolar_motion._normal_equations(matches, Motion(R, t), weight, 1)
         assert np.allclose(-gradient[0], residuals(np.zeros(5))[i] * np.array(slopes)[:, i], atol=1e-8)
 
 
@@ -73,10 +73,10 @@ def test_rotations_and_directions_are_those_of_the_truth() -> None:
     motion = se3.relative(truth.world_T_imu)
     error = so3.log_so3(np.swapaxes(motion[:, :3, :3], 1, 2) @ seen.motion[:, :3, :3])
     assert np.median(np.abs(error)) < 2.5e-3
-    before, after = track_links(sequence, 1)
+    before, after = track_pairs(sequence, 1)
     ray = rays(sequence)
-    links = Links(sequence.observations.frame[before], ray[before], ray[after])
-    found = epipolar_motions(links, sequence.n_frames - 1).motion
+    matches = RayMatches(sequence.observations.frame[before], ray[before], ray[after])
+    found = epipolar_motions(matches, sequence.n_frames - 1).motion
     camera = se3.relative(truth.world_T_imu @ sequence.imu_T_cam)[:, :3, 3] @ sequence.imu_T_cam[:3, :3].T
     cosine = (camera * found.direction).sum(axis=1) / np.linalg.norm(camera, axis=1)
     assert np.median(cosine) > 0.98
@@ -150,7 +150,7 @@ def test_wrong_tracks_are_masked_and_right_ones_are_not() -> None:
     assert np.array_equal(seen[:, :2], o.pixel[:, :2])
     excluded, piece = np.empty(len(o), np.uint8), np.empty(len(o), np.int64)
     excluded[was], piece[was] = problem.excluded[is_now], now.landmark[is_now]
-    before, after = track_links(sequence, 1)
+    before, after = track_pairs(sequence, 1)
     moved = o.pixel[:, :2] - clean().observations.pixel[:, :2]
     jump = np.abs(moved[after, 1] - moved[before, 1]) > 10.0  # across most epipolar lines
     kept = (excluded[before] == Excluded.NO) & (excluded[after] == Excluded.NO) & (piece[before] == piece[after])

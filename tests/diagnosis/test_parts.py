@@ -245,8 +245,8 @@ def test_a_track_that_jumps_is_cut_and_both_segments_are_used() -> None:
     pixel[late] = pixel[other]
     jumped = replace(scene, observations=Observations(o.frame.copy(), o.landmark.copy(), pixel))
     none = np.zeros(len(o), dtype=np.bool_)
-    links = TrackConsistency(jumped, scene.truth.world_T_imu, MaskSettings().prediction_gate)
-    split = split_tracks(jumped, links, MaskSettings(), none)
+    test = TrackConsistency(jumped, scene.truth.world_T_imu, MaskSettings().prediction_gate)
+    split = split_tracks(jumped, test, MaskSettings(), none)
     assert split.n_landmarks == scene.n_landmarks + 1
     assert (split.excluded == Excluded.NO).all()
     assert (split.landmark[late] == scene.n_landmarks).all()
