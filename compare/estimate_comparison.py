@@ -18,7 +18,7 @@ from fgbaseline.geometry import FloatArray
 REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
 """the reference of a run is the first of these that gave an answer"""
 SAME_GRAPH = ("isam2", "batch")
-"""estimators that minimize one and the same graph"""
+"""estimators with the same cost function: their divergence compares solvers"""
 NO_REFERENCE = "no estimator succeeded, so there is nothing to compare with"
 
 
@@ -129,7 +129,7 @@ class Result(Displayed):
     inertial: InertialEvidence | None = None
     """None for an estimate without velocity and biases"""
     divergence_common: CommonRmse | None = None
-    """divergence by which it is ranked, over the frames that all estimators have; None where it is not ranked"""
+    """divergence over the frames that all estimators have, for ranking; None if the estimator is not ranked"""
     ate_common: CommonRmse | None = None
     """RMSE of `truth_aligned` over the common frames"""
 
@@ -164,7 +164,7 @@ class Run(Displayed):
     reference: str | None
     trust: compare.Trust
     common: BoolArray | None
-    """(n,) the observations that every estimator used which uses any"""
+    """(n,) mask of the observations that were used by all estimators, those that use none aside"""
     settings: Mapping[str, object]
     """settings of the user, for the record"""
     held_out: HeldOutReport | None = None
@@ -179,7 +179,7 @@ class Run(Displayed):
 
     @property
     def compared(self) -> list[Result]:
-        """Results other than the reference that are compared with it, by their RMSE."""
+        """Results that are compared with the reference, sorted by RMSE of the divergence."""
         others = [r for r in self.answered if r.name != self.reference and r.divergence is not None]
         return sorted(others, key=lambda result: result.divergence_rmse)
 

@@ -70,9 +70,9 @@ class Criterion:
     doubtful: float
     """limit beyond which the reference is doubtful"""
     untrusted: float
-    """limit beyond which it is untrusted"""
+    """limit beyond which the reference is untrusted"""
     at_least: bool
-    """whether the value must not fall below its limits; else it must not exceed them"""
+    """whether the limits are lower bounds of the value; otherwise upper bounds"""
     verdict: Verdict
     remark: str = ""
     """note needed to interpret the value (inflated pixel sigma); empty without one"""

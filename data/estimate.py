@@ -50,7 +50,7 @@ class EventKind(StrEnum):
     RELINEARIZATION_FAILED = "final relinearization failed"
     NO_COVARIANCES = "no covariances"
     DESCENT_FAILED = "descent failed"
-    """Levenberg-Marquardt ended with an exception from one of its starts"""
+    """Levenberg-Marquardt from one of its initial values ended with an exception"""
     STARTED_AT_ISAM2 = "started at isam2's solution only"
     """a batch solution without the descent from dead reckoning, as wanted: it shows whether isam2 has converged"""
     ONE_START = "one start only"
@@ -142,7 +142,7 @@ class GyroBias(Displayed):
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Estimate(Displayed):
-    """Answer of one estimator to one problem, with T frames and n observations in its sequence."""
+    """Solution of a problem by one estimator; T frames, n observations in the sequence."""
 
     name: str
     world_T_imu: FloatArray
@@ -161,7 +161,7 @@ class Estimate(Displayed):
     """total time including set-up and covariances, s; NaN where it is not stated: a run then measures the call"""
     events: tuple[Event, ...] = ()
     innovations: Innovations | None = None
-    """NIS of a filter that records it"""
+    """innovations (NIS) of a filter; None if it does not record them"""
     gyro_bias: GyroBias | None = None
     """gyroscope bias, if estimated along with the poses"""
     velocity: FloatArray | None = None

@@ -41,7 +41,7 @@ MEASURES = {
     "px": "disparity offset",
     "s": "time offset",
 }
-"""quantity of a finding by its physical unit; other units name it themselves, such as `observations`"""
+"""physical unit -> quantity of a finding; other units are quantities themselves (`observations`)"""
 
 
 @dataclass(frozen=True, slots=True)

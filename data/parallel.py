@@ -44,7 +44,7 @@ def background_map(work: Callable[[int], T], n: int, processes: int) -> Iterator
 
 
 def _done(work: Callable[[int], T], numbers: int) -> dict[int, T]:
-    """Results by number of the items that this process computes."""
+    """Results of the items that this process takes from the queue `numbers` (a file descriptor), by number."""
     done = {}
     while number := os.read(numbers, 1):
         done[number[0]] = work(number[0])

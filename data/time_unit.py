@@ -48,7 +48,7 @@ EPOCH = (6e8, 4e9)
 USUAL_INTERVAL = (1e-3, 20.0)
 """s between frames, from 1000 frames a second to slow keyframes"""
 LONGEST_INTERVAL = 3600.0
-"""s between frames of one recording, however slow its keyframes are"""
+"""s, longest interval between frames that counts as one recording"""
 EXACT_INTEGER = 2**53
 """a float64 holds every whole number up to here"""
 SINGLE = 7
@@ -73,7 +73,7 @@ def since_1970(stamp: float, interval: float, slowest: float) -> TimeUnit | None
 
 
 def unit_of_stamps(t: FloatArray) -> tuple[TimeUnit, str] | None:
-    """The unit of stamps (T,) that can be no seconds, and how they show it; None where they can, or say nothing."""
+    """Unit of stamps (T,) that cannot be seconds, and the evidence; None if they can be, or show no unit."""
     first, interval = float(t[0]), float(np.median(np.diff(t)))
     unit = since_1970(first, interval, LONGEST_INTERVAL)
     if unit is TimeUnit.S:

@@ -24,7 +24,7 @@ class UserEstimator(NamedTuple):
 
 
 def parse(text: str) -> UserEstimator:
-    """`[NAME=]FILE:FUNCTION`; without a name it is that of the function. Raises InputError naming what is wrong."""
+    """Parses `[NAME=]FILE:FUNCTION`; the default name is FUNCTION. Raises InputError for other text."""
     named = re.fullmatch(r"(?:([^=:/\\]*)=)?(.+):([^:/\\]+)", text)
     if named is None or not named[3].isidentifier():
         raise InputError(f"estimator: '{text}' is not of the form {FORM}")

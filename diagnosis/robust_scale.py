@@ -1,4 +1,4 @@
-"""Factors from a median to a sigma, for Gaussian residuals; written out, so that a diagnosis need not import scipy."""
+"""Factors from a median to a sigma of Gaussian residuals; literals, so that a diagnosis need not import scipy."""
 
 CHI_SQUARE_MEDIAN = {1: 0.4549, 2: 1.3863, 3: 2.366, 6: 5.3481}
 """degrees of freedom -> median of the chi-square distribution"""

@@ -108,7 +108,7 @@ class MeasurementModel:
 
     @property
     def monocular(self) -> bool:
-        """Whether there is one camera: its rows are uL and vL."""
+        """Whether the camera is a single one, with the rows uL and vL."""
         return isinstance(self.camera, MonocularCamera)
 
     @property

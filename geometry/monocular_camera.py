@@ -71,7 +71,7 @@ def left_of(camera: Camera) -> MonocularCamera:
 
 
 def require_stereo(camera: Camera, what: str) -> StereoCamera:
-    """Stereo camera of a recording. Raises FgbaselineError, naming what needs it, where there is one camera."""
+    """The stereo camera `camera`. Raises FgbaselineError, naming the step `what`, for a single camera."""
     if isinstance(camera, StereoCamera):
         return camera
     raise FgbaselineError(f"{what} needs a stereo camera, and this recording has one camera")

@@ -17,7 +17,7 @@ PARALLEL = 1e-9
 
 
 class PointStart(NamedTuple):
-    """Initial positions of m points that have one."""
+    """Initial positions of the m points for which rays determine one."""
 
     place: NDArray[np.int64]
     """(m,) index of the point"""

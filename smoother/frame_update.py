@@ -20,7 +20,7 @@ DROPPED: Mapping[str, tuple[str, str]] = {
     EventKind.LANDMARK_DROPPED: ("landmark", "landmarks"),
     EventKind.FRAME_WITHOUT_OBSERVATIONS: ("frame's observations", "frames' observations"),
 }
-"""noun for what one event of a kind drops, and its plural"""
+"""kind of event -> noun for what it drops, singular and plural"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -36,7 +36,7 @@ class FrameUpdate:
     """motion from the previous frame, or the prior of the first one"""
     new_landmarks: tuple[NewLandmark, ...]
     tracked: Mapping[int, int]
-    """landmark of the graph -> its observation in this frame"""
+    """landmark that is in the graph -> index of its observation in this frame"""
 
     def without(self, landmarks: Collection[int]) -> "FrameUpdate":
         """Update without the new landmarks and observations of some landmarks."""

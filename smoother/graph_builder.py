@@ -18,7 +18,7 @@ from .initialization.prediction import predict_state
 from .initialization.windowed_initialization import optimize_window
 
 WINDOW_FRAMES = 2
-"""Frames before one without a known landmark that are optimized with it: initialization takes three observations."""
+"""Number of previous frames that are optimized with a frame without known landmarks: a landmark needs three views."""
 
 
 class GraphBuilder:

@@ -31,7 +31,7 @@ class PoseSigma(Displayed):
 
     @property
     def position_final(self) -> float:
-        """Position sigma of the last pose that has one, m."""
+        """Position sigma of the last pose with a covariance, m."""
         return _last(self.position)
 
     @property
@@ -41,7 +41,7 @@ class PoseSigma(Displayed):
 
     @property
     def rotation_final_deg(self) -> float:
-        """Rotation sigma of the last pose that has one, degrees."""
+        """Rotation sigma of the last pose with a covariance, degrees."""
         return _last(self.rotation_deg)
 
 

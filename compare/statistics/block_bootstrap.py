@@ -87,7 +87,7 @@ def _last_before_quiet(significant: BoolArray, in_a_row: int) -> int | None:
 
 
 class Bounded(NamedTuple):
-    """A statistic with its interval; NaN where it has none."""
+    """Statistic with its confidence interval; NaN without one."""
 
     value: float
     low: float = float("nan")

@@ -13,7 +13,7 @@ CONFIDENCE = 0.95
 AT_ONCE = 500_000
 """numbers per batch: few enough to stay in the processor's cache"""
 FEW = 8
-"""series whose quantiles are computed one by one"""
+"""number of series up to which quantiles are computed one series at a time, which is faster"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -85,8 +85,8 @@ def rotation_misfit(reference: FloatArray, estimate: FloatArray, world: FloatArr
 def least_rotation_misfit(matched: MatchedTrajectories) -> float:
     """Least `rotation_misfit`, deg, of the estimate as it is, of its inverse poses, and of its transposed orientations.
 
-    Where it fits as it is, that is all. The rotation between the worlds is that of the positions, and for the estimate
-    as it is else that of the rotations.
+    If the estimate fits as it is, the others are not tried. The rotation between the two worlds is that which aligns
+    the positions; if they determine none, the estimate as it is takes that which aligns the orientations.
     """
     R_ref, poses = matched.reference.rotation, matched.estimate.world_T_body
     R = poses[:, :3, :3]

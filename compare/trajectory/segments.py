@@ -38,7 +38,7 @@ class SegmentErrors(Displayed):
     """m, as requested"""
     step: int
     official: bool
-    """whether lengths and step are those of KITTI's devkit, so that results compare with published ones"""
+    """whether lengths and step are those of the KITTI devkit, as published results have them"""
 
     def __len__(self) -> int:
         return len(self.columns["start"])

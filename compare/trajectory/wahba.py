@@ -35,9 +35,9 @@ def solve_wahba(M: FloatArray, tie: Callable[[], FloatArray], floor: float) -> t
 def solve_wahba_about_axis(
     axis: FloatArray, M: FloatArray, tie: Callable[[], FloatArray], floor: float
 ) -> tuple[FloatArray, bool]:
-    """Rotation (3, 3) about a unit axis (3,) that maximizes trace(R^T M), and whether M leaves it undetermined.
+    """Rotation R (3, 3) about a unit axis (3,) that maximizes trace(R^T M), and whether M leaves R undetermined.
 
-    In that case it maximizes trace(R^T tie()); it is the identity where that leaves it undetermined too.
+    An undetermined R maximizes trace(R^T tie()) instead, or is the identity if that does not determine it either.
     """
     angle, amplitude = _best_angle(axis, M)
     if amplitude > max(floor, UNDETERMINED * float(np.linalg.norm(M))):

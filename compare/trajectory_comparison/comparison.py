@@ -60,7 +60,7 @@ class Result(Displayed):
     relative_statistics: dict[str, dict[str, ErrorStatistics]]
     """statistics by delta, then `translation` and `rotation_deg`"""
     reported_covariance: "ReportedCovariance | None"
-    """its covariances beside its errors against the truth"""
+    """consistency of the covariances that the estimate reports; None without covariances"""
     pixels: "Pixels | None"
     map: "pd.DataFrame | None"
     """see `compare.map_difference`; the landmarks are aligned as the path is"""
@@ -69,7 +69,7 @@ class Result(Displayed):
     notes: dict[str, str]
     """why values are missing, by key"""
     up_deviation: float | None = None
-    """deg, angle between the up that its file states, after alignment, and that of the comparison"""
+    """deg, angle between the file's stated up direction, after alignment, and that of the comparison"""
 
     @property
     def name(self) -> str:

@@ -17,7 +17,7 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 
 Source = ParsedTrajectory | Trajectory
 Times = Sequence[FloatArray]
-"""stamps of frames, s, for files without: each takes those that have one for each of its poses"""
+"""stamps, s, for files without: a file takes the first array that is as long as its trajectory"""
 FEWEST = 10
 """least number of pairs of poses to judge quaternion orders by"""
 VARIED, TURNED = np.deg2rad(1.0), np.deg2rad(10.0)
@@ -50,7 +50,7 @@ class Resolved:
 
     @property
     def up(self) -> FloatArray | None:
-        """(3,) what points up in its world, where the file or its format defines it."""
+        """Unit vector (3,) that points up in the world of the poses; None if neither file nor format defines it."""
         return self.source.up if isinstance(self.source, ParsedTrajectory) else None
 
     @property
@@ -65,7 +65,7 @@ class Resolved:
 
     @property
     def orders(self) -> tuple[Order, ...]:
-        """The orders that its quaternions may have, the likeliest first."""
+        """Possible orders of the quaternion components, the likeliest first."""
         return self.source.orders if isinstance(self.source, ParsedTrajectory) else ("xyzw",)
 
     def remarked(self, remark: str) -> "Resolved":
@@ -209,7 +209,7 @@ def _decided(each: Resolved, assumed: float = 0.0, other: float = 0.0) -> tuple[
 
 
 def _of_inverse_poses(reference: Resolved, each: Resolved, times: Times, settings: Settings) -> Resolved | None:
-    """The input with the one order in which its inverse poses fit the reference's positions; None without such."""
+    """Input in the only quaternion order with which its inverse poses fit the reference; None unless there is one."""
     fitting = []
     for order in each.orders:
         matched = paired(reference.trajectory(times), each.trajectory(times, order), settings)

@@ -22,11 +22,11 @@ class Entry(Displayed):
     covariance: FloatArray | None = None
     """(n, 6, 6) of the right perturbation of each pose"""
     up: FloatArray | None = None
-    """(3,) what points up in its world, where its file or the format of the file defines it"""
+    """(3,) unit vector that points up in the world of the poses; None if neither file nor format defines it"""
     up_stated: bool = False
     """whether the file itself states `up`"""
     remarks: tuple[str, ...] = ()
-    """findings on its file: each completes a sentence that begins with its name"""
+    """remarks on the file, each the rest of a sentence that begins with the name"""
     trust: "Trust | None" = None
     """trust in a run's reference; None for files"""
     by_product: bool = False

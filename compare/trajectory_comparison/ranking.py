@@ -24,7 +24,7 @@ class Ranking(Displayed):
     at: dict[str, IntArray]
     """indices of the pairs of poses at these stamps, by name, nearest first"""
     common: dict[str, ErrorStatistics]
-    """statistics over them, in this order"""
+    """statistics of the position errors over the pairs in `at`, m, by name, nearest first"""
     behind: dict[str, RmseDifference]
     """RMSE of each rival above that of the nearest, which is missing"""
     rivals: tuple[str, ...]

@@ -70,7 +70,7 @@ class Settings:
     all_pairs: bool = False
     form: Literal["tum", "kitti", "euroc", "npz"] | None = None
     times: tuple["Path | FloatArray", ...] = ()
-    """stamps for KITTI files: each takes those with one for each of its poses"""
+    """stamps for KITTI files, s: a file takes the first array that is as long as its trajectory"""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
     """unit of stamps, where neither a header nor their size shows it"""
     quaternion: Literal["xyzw", "wxyz"] | None = None

@@ -6,9 +6,9 @@ from itertools import product
 from ..time_unit import TimeUnit
 
 Spans = Mapping[TimeUnit, tuple[float, float]]
-"""first and last stamp, s, by the unit that they would be in"""
+"""possible unit -> first and last stamp, s"""
 CLEARLY = 10.0
-"""factor by which the time in common by one unit exceeds that by the next best, so that the unit is decided"""
+"""ratio of the common time in one unit to that in the next best, above which the unit is decided"""
 
 
 def units_in_common(first: Spans, second: Spans) -> tuple[TimeUnit, TimeUnit] | None:

@@ -208,7 +208,7 @@ def _require_same_speed(sequence: Sequence, file: ParsedTrajectory) -> None:
 
 
 def _unit(sequence: Sequence, file: ParsedTrajectory) -> TimeUnit:
-    """The unit of the stamps, by the time that they share with the recording where they leave it open."""
+    """Unit of the stamps; an ambiguous one is that in which they share the most time with the recording."""
     assert file.stamps is not None
     spans = {unit: (float(t[0]), float(t[-1])) for unit in file.units for t in (file.stamps.seconds(unit),)}
     found = units_in_common({TimeUnit.S: (float(sequence.t[0]), float(sequence.t[-1]))}, spans)

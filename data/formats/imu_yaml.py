@@ -49,7 +49,7 @@ def assumed_calibration(why: str) -> ImuCalibration:
 
 
 def calibration_or_assumed(path: FilePath | None, why: str) -> ImuCalibration:
-    """The calibration in a YAML file; without one what stands in for it. Raises as `read_imu_calibration`."""
+    """Calibration from a YAML file, or without one the assumed calibration. Raises as `read_imu_calibration`."""
     return assumed_calibration(why) if path is None else read_imu_calibration(path)
 
 

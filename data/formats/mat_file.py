@@ -174,7 +174,7 @@ class MatFile:
         return _exactly(source, n_bytes + -n_bytes % 8)[:n_bytes]
 
     def _tag(self, source: Readable) -> tuple[int, int, bytes | None]:
-        """Type and size of the next element, and its data if it is of the small kind that has them in its tag."""
+        """Type and size, in bytes, of the next element, and the data of a small element, whose tag contains them."""
         raw = _exactly(source, 8)
         first, second = np.frombuffer(raw, self._order + "u4").tolist()
         if first >> 16:

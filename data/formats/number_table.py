@@ -199,7 +199,7 @@ def _floats(
 
 
 def require_width(lines: Lines, counts: dict[int, str]) -> None:
-    """Raises InputError where the first line has none of these counts of numbers; they come with what they mean."""
+    """Raises InputError unless the count of numbers in the first line is a key of `counts`, whose values name them."""
     lines.require_some()
     if lines.width not in counts:
         expected = " or ".join(f"{n} ({name})" for n, name in counts.items())

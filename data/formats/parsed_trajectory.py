@@ -39,7 +39,7 @@ class ParsedTrajectory:
     quaternion: FloatArray | None = None
     """(n, 4) quaternion components in the order of the file"""
     orders: tuple[Order, ...] = ("xyzw",)
-    """possible orders of the quaternion components, the usual one first; one if the file states it"""
+    """possible orders of the quaternion components, the usual one first; only one if the file defines it"""
     stamps: Stamps | None = None
     """time stamps of the poses; None for a file without"""
     units: tuple[TimeUnit, ...] = (TimeUnit.S,)

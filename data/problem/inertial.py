@@ -31,7 +31,7 @@ class InertialStart(Displayed):
     """(15, 15) of the error [translation, rotation, velocity, gyroscope bias, accelerometer bias]; position and heading
     have no variance, since they define the world"""
     source: str = "given"
-    """how it was found, one sentence"""
+    """method by which the start was estimated, one sentence"""
 
     @property
     def bias(self) -> FloatArray:

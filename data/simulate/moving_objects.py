@@ -13,7 +13,7 @@ _SLOT = 4.0
 
 
 class MovingObjects:
-    """Moving object, one at a time, with constant velocity, which its surface points share."""
+    """Moving object with constant velocity, shared by the points on its surface; one object at a time."""
 
     def __init__(self, path: Path, t: FloatArray, world: WorldName, rng: np.random.Generator) -> None:
         self._t = t
@@ -42,7 +42,7 @@ class MovingObjects:
         self._velocity = np.einsum("nij,nj->ni", self._axes, speed)
 
     def points(self, birth: IntArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-        """Where points (n, 3) are at the frames (n,) of their birth, m, and how they move (n, 3), m/s."""
+        """Positions (n, 3), m, and velocities (n, 3), m/s, in the world of points at their frames of birth (n,)."""
         t = self._t[birth]
         slot = np.searchsorted(self._begin, t, side="right") - 1
         surface = rng.uniform(-1.0, 1.0, (len(birth), 3))

@@ -97,7 +97,7 @@ class Simulation:
     cameras: Cameras = "stereo"
     """both cameras of the rig, or the left one alone, which needs `imu`"""
     standing: float = 0.0
-    """s that the body stands still before it sets off"""
+    """duration of standstill before the motion, s"""
     imu: SimulatedImu | None = None
     """raw inertial samples in place of body velocities; their axes, scale, offset and gyroscope bias are those below"""
 
@@ -143,7 +143,7 @@ class Simulation:
     bursts: tuple[tuple[float, float, float], ...] = ()
     """(start, end, share) in s: between them this share of the observations is wrong"""
     moving_share: float = 0.0
-    """share of the observations that lie on things that move; they come on top of `features_per_frame`"""
+    """observations of moving objects as a share of all, in addition to `features_per_frame`"""
 
     def __post_init__(self) -> None:
         _require_choice("path", self.path, get_args(PathName))

@@ -17,7 +17,7 @@ MAX_METERS = 1000.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Path:
-    """A continuous motion; beyond its ends it goes on with the velocities it has there."""
+    """Motion as a function of time; before its start and after its end velocities are constant."""
 
     t: FloatArray
     """(g,) s, rising; reaches beyond the first and last frame"""

@@ -10,9 +10,9 @@ from .opencv import opencv
 from .rectification import Image
 
 COARSE = 4
-"""px of the image in one of the coarse image in which mean and deviation are taken"""
+"""side in px of the image for one px of the coarse image, in which mean and deviation are computed"""
 WINDOW = 9
-"""coarse px, side of the square over which they are taken"""
+"""side of the square over which mean and deviation are computed, px of the coarse image"""
 NOISE = 10.0
 """gray levels; keeps the noise of surfaces without texture small"""
 GAIN = 45.0

@@ -55,7 +55,7 @@ class TrackedRecording:
 
     @property
     def no_motion(self) -> str | None:
-        """What a run lacks, and what to add; None where it has everything."""
+        """Sentence on missing motion data and the options that add it; None if nothing is missing."""
         return _no_motion(self.recording)
 
     def sequence(self, truth: TruthFile | None = None) -> Sequence:

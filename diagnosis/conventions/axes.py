@@ -123,7 +123,7 @@ def _lagged(recorded: FloatArray, known: BoolArray, lag: int) -> tuple[FloatArra
 
 
 def _lead(scores: dict[str, float], best: str, axis: int) -> float:
-    """By how much the best convention leads those that have another component on this axis."""
+    """Lead of the best convention, in log-likelihood, over all with another component on this axis."""
     row = best.split(",")[axis]
     return scores[best] - max(score for name, score in scores.items() if name.split(",")[axis] != row)
 
@@ -163,7 +163,7 @@ def _decided(
     recorded: FloatArray,
     known: BoolArray,
 ) -> Axes:
-    """The convention that agrees with the best one on the axes that are seen: a preferred one if that does."""
+    """Convention that has the components of the best one on the excited `axes`, a preferred one if possible."""
     parts = best.split(",")
     agreeing = [n for n in scores if all(n.split(",")[i] == parts[i] for i in range(3) if axes[i])]
     name = next((n for n in preferred if n in agreeing), best)

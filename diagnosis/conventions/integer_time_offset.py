@@ -19,7 +19,7 @@ ENOUGH = 25.0
 STANDARD_ERROR_FACTOR = 3.0
 """factor on the standard error, for the same reason"""
 HELD = 0.5
-"""share of the cost's fall that the parabola predicts, from which on it describes the cost"""
+"""actual decrease of the cost over that predicted by the parabola, above which the parabola is accepted"""
 ROUNDING = 1.0 / np.sqrt(12.0)
 """intervals, the standard error of an integer"""
 

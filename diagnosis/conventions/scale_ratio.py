@@ -20,7 +20,7 @@ CHANCE = 4.5
 SURE = 3.0
 """standard errors"""
 WINDOWS = (1, 4, 8, 16, 32)
-"""intervals that are averaged: noise shrinks by it, a motion lasts"""
+"""lengths, in intervals, of moving averages, which reduce the noise and keep the motion"""
 OUTER = 0.95
 """quantile of the sizes at which samples are clipped"""
 MIN_SAMPLES = 8
@@ -31,9 +31,9 @@ class ScaleRatio(NamedTuple):
     """RMS of the odometry over RMS of the recorded velocity."""
 
     ratio: float
-    """NaN without a sample"""
+    """RMS ratio; NaN without a sample"""
     known: bool
-    """whether both velocities correlate, so that the ratio is not that of two noises"""
+    """whether the two velocities correlate; otherwise the ratio is one of noises"""
     correlation: float = 0.0
     samples: int = 0
     """number of samples that are compared"""
@@ -82,7 +82,7 @@ def scale_ratio(seen: FloatArray, recorded: FloatArray, known: BoolArray, *, cen
 
 
 def _inside(n: int, lag: int) -> BoolArray:
-    """(n,) the samples that have a partner at this lag."""
+    """Mask (n,) of the samples for which sample k + lag exists."""
     k = np.arange(n) + lag
     return np.asarray((k >= 0) & (k < n), dtype=np.bool_)
 
@@ -96,7 +96,7 @@ def _samples(seen: FloatArray, recorded: FloatArray, known: BoolArray, window: i
 
 
 def _clipped(signal: FloatArray) -> FloatArray:
-    """Samples (m, 3), those that are larger than nearly all others shortened to the size of these."""
+    """Samples (m, 3) with norms clipped at their quantile OUTER."""
     size = np.linalg.norm(signal, axis=1)
     most = np.quantile(size, OUTER)
     shorter = np.divide(most, size, out=np.ones_like(size), where=size > most)

@@ -62,14 +62,14 @@ NOUNS = {
 }
 TURNS = "the camera's velocity in turns"
 SAME_RATIO = 0.05
-"""share by which turns and distances may differ beyond their noise where the stamps are the cause"""
+"""relative difference of both scale ratios, beyond their noise, up to which the stamps' unit explains both"""
 SETTLE_RATES = "write rad/s, or the factor as angular_velocity in a table [units] in --repairs"
 SETTLE_DISTANCES = "write m/s and m, or the factors as linear_velocity and baseline in a table [units] in --repairs"
 
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """Factors that convert each recorded quantity to SI; `doubt` states an ambiguity that remains."""
+    """Factors that convert recorded quantities to SI."""
 
     time: float = 1.0
     """s"""
@@ -82,10 +82,11 @@ class Units:
     extrinsic: float = 1.0
     """m, of the translation of imu_T_cam"""
     doubt: str = ""
+    """sentence on an ambiguity that remains; empty without one"""
     scale_ratios: tuple[ScaleRatio, ScaleRatio] | None = None
-    """ratios of angular and of linear velocity"""
+    """odometry over recorded angular velocity, and over recorded linear velocity"""
     given: frozenset[str] = frozenset()
-    """names of those that the user states"""
+    """names of the factors that the user specified"""
 
     @property
     def wrong(self) -> int:
@@ -206,7 +207,7 @@ def _hypotheses(given: Mapping[str, float]) -> Iterator[Units]:
 
 
 def _fits(units: Units, ratios: tuple[float | None, float | None]) -> bool:
-    """Whether the ratios of turns and distances that are known are those of these units."""
+    """Whether these units explain the known scale ratios of turns and distances."""
     expected = (units.time * units.angular, units.time * units.linear / units.baseline)
     return all(ratio is None or _is_near(ratio, value) for ratio, value in zip(ratios, expected, strict=True))
 

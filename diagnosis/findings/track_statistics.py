@@ -15,9 +15,9 @@ from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY, consecutive
 from ..velocity_diagnosis.result import Diagnosis
 
 BURST = 1.0 / 3.0
-"""share of the matches of an interval that contradict its motion, from which on it is a burst"""
+"""share of wrong matches above which an interval is a burst of them"""
 BURST_MATCHES = 5
-"""matches of a burst that contradict it at least, so that an interval with few features is none"""
+"""smallest number of wrong matches in a burst, so that an interval with few features is none"""
 WRONG_PIXEL = 0.5
 """px: usual noise of the rows; segments within four sigmas of it are not wrong"""
 MOVING_MATCHES = 5

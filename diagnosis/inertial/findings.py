@@ -26,7 +26,7 @@ from .units import imu_unit_findings
 MIN_DROPPED = 0.001
 """share of the samples"""
 DROPPED = 1.5
-"""sample periods from one sample to the next, from which on one is missing"""
+"""interval between samples, in sample periods, from which on a sample is missing"""
 
 
 def inertial_findings(found: InertialDiagnosis, tracks: RepairedTracks | None = None) -> tuple[Finding, ...]:

@@ -95,7 +95,7 @@ def _source(sequence: Sequence) -> str:
 
 
 def imu_remarks(sequence: Sequence) -> tuple[str, ...]:
-    """What is known of the samples' noise and gaps, one sentence each."""
+    """Sentences on noise and gaps of the inertial samples."""
     imu = sequence.imu
     assert imu is not None
     n = imu.noise

@@ -46,9 +46,9 @@ class InertialDiagnosis(Displayed):
     sensors: SensorChecks | None = None
     """checks of gyroscope and accelerometer against the cameras"""
     tracks: RepairedTracks | None = None
-    """with one camera, whose mask needs no path: it comes before the start"""
+    """split tracks of one camera; None for stereo, whose mask needs the path"""
     monocular: MonocularStart | None = None
-    """with one camera: what its first seconds of motion determine"""
+    """initialization of one camera; None for stereo"""
 
     @property
     def pixel(self) -> float:

@@ -58,7 +58,7 @@ class SensorChecks:
 def sensor_checks(
     sequence: Sequence, seen: Odometry, path: InertialPath | None = None, start: Start | None = None
 ) -> SensorChecks:
-    """The checks of a recording in SI units with its path, where it has one."""
+    """Checks of both sensors of a recording in SI units, along its path if there is one."""
     assert sequence.imu is not None
     known = seen.known
     rate, dt = mean_rates(sequence), sequence.dt

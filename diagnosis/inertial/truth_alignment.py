@@ -43,7 +43,7 @@ def tied_truth(truth: Truth, path: FloatArray, frames_per_second: float) -> tupl
 
 
 def path_from(pose: FloatArray, path: FloatArray) -> FloatArray:
-    """A path (T, 4, 4) whose z axis points up, turned about it and shifted so that it begins at `pose` (4, 4).
+    """Path (T, 4, 4), z up, rotated about z and translated so that it begins at `pose` (4, 4).
 
     Frame 0 gets the pose itself; the others keep their tilt, which all samples determine.
     """

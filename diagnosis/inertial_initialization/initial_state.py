@@ -86,7 +86,7 @@ def standing_states(imu: ImuIntervals, frames: IntArray) -> States:
 
 
 def start_of(solution: Solution, source: str, standing: float) -> Start:
-    """The first state in the world in which its rotation is the smallest one."""
+    """First state of a solution, in the world whose heading makes its rotation smallest and whose z axis points up."""
     first = solution.states.pose[0]
     turn = np.eye(4)
     turn[:3, :3] = so3.rotation_to_z(first[2, :3]) @ first[:3, :3].T

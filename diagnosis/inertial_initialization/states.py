@@ -62,7 +62,7 @@ class Motions:
     noise: FloatArray
     """(m, 15, 15)"""
     biases: FloatArray
-    """(m, 6) with which they were integrated"""
+    """(m, 6) biases [gyroscope, accelerometer] that the samples were integrated with, rad/s and m/s^2"""
 
     def between(self, i: int) -> strapdown.PreintegratedImu:
         """The motion of interval i."""

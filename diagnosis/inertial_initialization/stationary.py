@@ -12,9 +12,9 @@ STILL = 2.0
 """px, median shift of the tracks of frame 0 up to which the camera stands"""
 MIN_TRACKS = 8
 SHORTEST = 0.5
-"""s, of a standing start"""
+"""s, shortest standing start that is used"""
 LONGEST = 3.0
-"""s that are used of one"""
+"""s, longest part of a standing start that is used"""
 KEYFRAMES = 20
 
 

@@ -50,12 +50,12 @@ class Rest(NamedTuple):
 
 
 class Window(NamedTuple):
-    """What the first seconds of motion determine."""
+    """Solution of the first seconds of motion: states, scale, pixel noise and depths of the scene."""
 
     frames: IntArray
     """(k,) keyframes"""
     span: float
-    """s of motion"""
+    """duration, s"""
     solution: Solution
     pixel: float
     """px, noise of each row"""
@@ -63,7 +63,7 @@ class Window(NamedTuple):
 
 
 def moving_window(sequence: Sequence, imu: ImuIntervals, rest: Rest | None = None) -> Window:
-    """The shortest window that determines the scale, or else the one that does so best; it begins after a `rest`.
+    """Shortest window that determines the scale, otherwise that with the smallest scale sigma, beginning after `rest`.
 
     Raises ValueError with the reason where no window has a solution.
     """

@@ -20,7 +20,7 @@ from ..tracks.observation_mask import MaskSettings, prediction_gate, split_track
 from ..tracks.track_segments import consecutive
 
 STEPS = (1, 2, 3)
-"""frames between the observations that are compared, so that a track is followed over one that is wrong"""
+"""frames between compared observations: more than one, so that a track survives a single wrong match"""
 
 PIXEL = 0.5
 """px, least noise of a row: errors of a tracker that are smaller from frame to frame are shared by its tracks"""

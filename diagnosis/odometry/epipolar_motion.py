@@ -17,7 +17,7 @@ from fgbaseline.geometry import FloatArray, so3
 from ..robust_scale import CHI_SQUARE_MEDIAN
 
 MIN_MATCHES = 12
-"""tracks of a pair from which on its motion is determined: twice its degrees of freedom, and some wrong ones"""
+"""smallest number of matches of a pair for its motion: twice the degrees of freedom, and some for wrong matches"""
 ROUNDS, FLOW_ROUNDS, DIRECTION_ROUNDS = 12, 5, 3
 FREEDOM = 5
 TRUNCATION = 9.0

@@ -132,7 +132,7 @@ class Repairs(_Overrides):
     velocity_scale: Annotated[float, PlainValidator(_between(0.01, 100.0, 1.0))] | None = None
     """recorded over true linear velocity; divided by"""
     time_offset_s: Annotated[float, PlainValidator(_between(-1e3, 1e3, 0.0))] | None = None
-    """s: sample k describes the interval that begins this long after its stamp"""
+    """s, delay from the stamp of sample k to the begin of the interval over which it is held"""
     shift_intervals: Annotated[float, PlainValidator(_between(-1e4, 1e4, 0.0))] | None = None
     """shift in intervals between frames"""
     misalignment_deg: Annotated[Vector, PlainValidator(_vector(180.0, "degrees"))] | None = None

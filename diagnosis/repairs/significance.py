@@ -1,4 +1,4 @@
-"""Estimated errors that are significant, and so large that they are repaired."""
+"""Significance of the estimated calibration errors: only significant and large ones are repaired."""
 
 import numpy as np
 
@@ -8,14 +8,15 @@ from ..noise.calibration_fit import SIGNIFICANT
 from ..velocity_diagnosis.result import Diagnosis
 
 MIN_BIAS = 0.002
-"""rad/s"""
+"""rad/s, largest component of a gyroscope bias below which it is not repaired"""
 MIN_MISALIGNMENT = np.deg2rad(0.25)
+"""rad, component of the extrinsic rotation error below which it is not repaired"""
 MIN_OFFSET = 0.05
-"""px"""
+"""px, disparity offset below which it is not repaired"""
 
 
 def significant_bias(diagnosis: Diagnosis) -> FloatArray:
-    """(3,) rad/s in recorded axes; zero where the bias is too small or too uncertain to be taken off."""
+    """Gyroscope bias (3,), rad/s in recorded axes; zero if it is too small or too uncertain to be subtracted."""
     bias, deviation = diagnosis.gyro_bias, diagnosis.gyro_bias_deviation
     if "gyro_bias" in diagnosis.overrides:
         return bias
@@ -24,7 +25,7 @@ def significant_bias(diagnosis: Diagnosis) -> FloatArray:
 
 
 def significant_misalignment(diagnosis: Diagnosis) -> FloatArray:
-    """(3,) rad; zero in each component that is too small or too uncertain."""
+    """Rotation error (3,) of imu_T_cam, rad; each component is zero if it is too small or too uncertain."""
     angle, deviation = diagnosis.misalignment
     if "misalignment_deg" in diagnosis.overrides:
         return angle
@@ -32,12 +33,12 @@ def significant_misalignment(diagnosis: Diagnosis) -> FloatArray:
 
 
 def significant_scale(diagnosis: Diagnosis) -> float:
-    """By which velocities are divided: 1 unless user-specified, since the stereo baseline may be wrong instead."""
+    """Divisor of the linear velocity: 1 unless user-specified, since the baseline may be wrong in its place."""
     return diagnosis.velocity_scale[0] if "velocity_scale" in diagnosis.overrides else 1.0
 
 
 def significant_offset(diagnosis: Diagnosis) -> float:
-    """px; zero where the disparity offset is too small or too uncertain."""
+    """Disparity offset, px; zero if it is too small or too uncertain."""
     offset, deviation = diagnosis.disparity_offset
     if "disparity_offset_px" in diagnosis.overrides:
         return offset

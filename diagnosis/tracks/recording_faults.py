@@ -1,4 +1,4 @@
-"""Faults that make a recording, or all of its observations, unusable, by their cause."""
+"""Faults that make a recording or all its observations unusable, by cause."""
 
 import numpy as np
 

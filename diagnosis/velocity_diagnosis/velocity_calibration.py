@@ -22,7 +22,7 @@ MIN_INTERVALS = 20
 SURE_SHIFT = 2.0
 """standard errors from a usual shift, beyond which another one is used; STANDARD_ERROR_FACTOR is in them already"""
 SNAP = 0.15
-"""intervals: a shift this near to a usual one (`Shift`) is taken for it"""
+"""intervals, distance from a usual shift (`Shift`) below which that one is used"""
 
 
 def calibrate_velocities(

@@ -150,7 +150,7 @@ def _fit(
     redundancy: FloatArray,
     squared: FloatArray,
 ) -> WindowFit:
-    """Solution of one window out of the arrays of its batch."""
+    """Solution of one window, from the arrays of a batch of windows."""
     f, o, p, k = data.frames[window], data.observations[window], data.points[window], data.intervals(window)
     motion_redundancy = float(redundancy[k].sum())
     return WindowFit(

@@ -42,7 +42,7 @@ def spread_spans(n_frames: int) -> list[Span]:
 
 
 def unbroken_spans(odometry: Odometry) -> list[Span]:
-    """Windows without an interval that lacks odometry, the longest ones first."""
+    """Windows in which odometry knows the motion of every interval, the longest first."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], odometry.known, [False]]).astype(np.int8)))
     spans: list[Span] = []
     for start, end in zip(edges[::2], edges[1::2], strict=True):

@@ -73,7 +73,7 @@ def joint_ekf_ungated(problem: Problem, progress: Progress | None = None) -> Est
 
 
 def _require_inverse_depth(problem: Problem, settings: JointSettings) -> None:
-    """Refuses what one camera cannot do. Raises FgbaselineError."""
+    """Raises FgbaselineError for settings that one camera does not support."""
     if settings.coordinates is LandmarkRepresentation.WORLD:
         raise FgbaselineError(
             "joint-ekf-textbook needs a stereo camera: from one view a point in the world has no position to start at"

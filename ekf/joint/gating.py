@@ -32,7 +32,7 @@ class GatedObservations:
     weight: FloatArray
     """(n,) kernel weights: factors on the inverse of each observation's noise"""
     rejection: EventKind | None = None
-    """reason for which the others are rejected"""
+    """reason for the rejection of observations that are not accepted; None if all are"""
 
     @property
     def order(self) -> IntArray:

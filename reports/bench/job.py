@@ -98,7 +98,7 @@ class Planned:
     """sequence and settings: the jobs of a case differ only in the seed"""
     sequence: str
     settings: Mapping[str, str]
-    """those that differ between the jobs of the suite, as text"""
+    """settings that vary over the suite, as text"""
     work: float
     """number of observations, to predict the remaining time"""
     has_seed: bool

@@ -61,11 +61,11 @@ class ComparisonData:
     relative: Mapping[str, Mapping[str, Columns]]
     """by delta, then estimate: `translation`, m, and `rotation_deg` of each motion"""
     pairs: str
-    """poses that these are between, in words"""
+    """choice of the pairs of poses of `relative`, in words"""
     segments: Mapping[str, Columns]
     """by estimate, KITTI's segment errors: see `SegmentErrors.means_by_length`"""
     lengths: str
-    """those of the segments, in words"""
+    """lengths of the segments, in words"""
     by_depth: "Mapping[str, pd.DataFrame]"
     """by estimate: see `compare.map_by_depth`"""
 

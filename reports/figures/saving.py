@@ -26,7 +26,7 @@ _written: WeakKeyDictionary[Figure, dict[str, bytes]] = WeakKeyDictionary()
 
 @dataclass(frozen=True, slots=True)
 class EncodedFigure:
-    """Figure of which only what was written is left."""
+    """Figure in its file formats, without its matplotlib objects."""
 
     title: str
     size: tuple[float, float]
@@ -36,7 +36,7 @@ class EncodedFigure:
 
 
 def encode_figure(figure: Figure, forms: Iterable[str]) -> EncodedFigure:
-    """Remainder of a figure once it was written in these forms."""
+    """Encodes a figure in these file formats."""
     width, height = (float(side) for side in figure.get_size_inches())
     with in_style(), without_layout_engine():
         files = {form: _encoded(figure, form, SCREEN) for form in forms}

@@ -55,7 +55,7 @@ class Outcome:
     reprojection: float
     """px, median over all observations of the chosen features"""
     behind: float
-    """share of these that violate cheirality at the end"""
+    """share of the observations whose landmark is behind the camera after the last frame"""
     height: float
     """m, of the end above the start"""
     truth_rmse: float

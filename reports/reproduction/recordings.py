@@ -22,7 +22,7 @@ TRACKS_PER_FRAME = 13_289 / 3_026
 ANGULAR_AXES = "x,-y,-z"
 """axes of the recorded rates, as diagnosed in 03.npz, which has the same car and course"""
 STANDSTILL = 0.2
-"""m/s, below which the gyroscope measures its bias"""
+"""m/s, speed below which the mean rate is the bias of the gyroscope"""
 LEAST_STANDSTILL = 20
 """fewest frames for an estimate of the bias"""
 FIRST_TRY, MORE, TRIES = 14.0, 1.3, 6
@@ -38,7 +38,7 @@ class StandIn:
     gyro_bias: FloatArray
     """(3,) rad/s in recorded axes"""
     wrong: BoolArray
-    """(n,) its observations that are wrong matches"""
+    """(n,) mask of the observations that are simulated as wrong matches"""
     remark: str
 
 

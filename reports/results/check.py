@@ -54,7 +54,7 @@ class Line:
     reason: str
     """why there is no value, or why the limit cannot be judged"""
     missing: int = 0
-    """errors that are NaN, which the value leaves out"""
+    """number of NaN errors, which the value does not include"""
     shortage: Shortage | None = None
     """None where its sample is large enough"""
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Value(NamedTuple):
-    """A value, and its 95 % interval where it has one; NaN for what is missing."""
+    """Value with its 95 % interval; NaN for a missing value or bound."""
 
     value: float
     low: float = nan
@@ -113,7 +113,7 @@ class Metric:
         return f"{self.short}, {self.unit}" if self.unit else self.short
 
     def text(self, value: float, resolution: float = RESOLUTION) -> str:
-        """Value as text, without unit; below `resolution` that it is less than this (`resolved`)."""
+        """Value as text without unit; `< resolution` for rounding error."""
         if self.is_rounding(value, resolution):
             return resolved(value, resolution)
         return number(int(value) if self.count and isfinite(value) else value)

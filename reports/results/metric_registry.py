@@ -228,7 +228,7 @@ METRICS = (
 
 
 def shown_in(tables: Tables) -> list[Metric]:
-    """Metrics that are columns of one of these tables."""
+    """Metrics that are columns of at least one of `tables`."""
     return [metric for metric in METRICS if tables & metric.tables]
 
 
@@ -257,5 +257,5 @@ MEASURED = tuple(metric for metric in METRICS if metric.measure is not None)
 
 
 def measured(run: "Run", result: "Result") -> dict[str, float]:
-    """Values of the metrics that have their own `measure`, by key."""
+    """Values of the metrics with a `measure`, by key."""
     return {metric.path[0]: metric.measure(run, result) for metric in MEASURED if metric.measure is not None}

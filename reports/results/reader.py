@@ -61,7 +61,7 @@ class ReferenceRecord(_Record):
 
     name: str | None = None
     trust: Literal["trusted", "doubtful", "untrusted"] | None = None
-    """None where it is unknown: a trajectory that the user gave"""
+    """None if the reference is a trajectory of the user, on which no trust is decided"""
     reasons: tuple[str, ...] = ()
     sigma: SigmaRecord | None = None
     """None where it has no covariances, and in the summaries of older versions"""

@@ -2,7 +2,7 @@
 
 DEFAULT_ESTIMATORS = ("dead-reckoning", "ekf", "isam2", "isam2-online")
 ONE_CAMERA_ESTIMATORS = ("dead-reckoning", "joint-ekf", "isam2", "isam2-online")
-"""those with one camera: `ekf` starts landmarks by disparity"""
+"""default estimators with one camera; `ekf` is none of them, as it initializes landmarks by disparity"""
 BATCH_OBSERVATIONS = 65_000
 """observations of a problem up to which `batch` is a default too: its descent from the solution of isam2 takes less
 than a fifth of the time of isam2 (0.15 to 0.18 on the KITTI drives of 9,500 and 42,500)"""

@@ -56,11 +56,11 @@ class RunSettings:
     """Settings of the user."""
 
     sequence: Path | Sequence | Problem | None = None
-    """a recording, in a file or in memory, or a problem that is posed already; None for the simulated drive"""
+    """recording in a file or in memory, or a problem; None for the simulated drive"""
     preset: Literal["calibrated", "documented"] = "calibrated"
     estimators: tuple[str, ...] = DEFAULT_ESTIMATORS
     batch_up_to: int = 0
-    """number of observations up to which `batch`, started at the answer of `isam2` only, is added to them"""
+    """number of observations up to which `batch`, started at the solution of `isam2`, is added to `estimators`"""
     features: int | Literal["all"] | None = None
     """None for the preset's default"""
     landmarks: LandmarkMode = LandmarkMode.UPDATED
@@ -74,7 +74,7 @@ class RunSettings:
     time_unit: TimeUnit | None = None
     """unit of the recording's stamps; None to detect it"""
     held_out: float = 0.0
-    """share of the tracks kept from diagnosis and estimators, to judge the paths by"""
+    """share of the tracks that diagnosis and estimators do not get; trajectories are ranked by them"""
     repairs: Path | None = None
     """TOML file of user-specified repairs"""
     velocities: Path | None = None
@@ -98,15 +98,15 @@ class RunSettings:
     topics: tuple[str, ...] = ()
     """topics of a bag: left, right and, if any, the IMU"""
     functions: Mapping[str, Callable[..., object]] = field(default_factory=dict)
-    """estimators among the names that are not installed, such as those of the user's files"""
+    """name -> function of estimators that are not registered, such as those of the user's files"""
     add: tuple[str | ParsedTrajectory | Trajectory, ...] = ()
     """trajectories beside the estimators: `[NAME=]FILE`, or parsed already"""
     add_body: BodyFrame | None = None
-    """body whose poses they have; None for the IMU"""
+    """body whose poses the added trajectories have; None for the IMU"""
     add_time_unit: Literal["s", "ms", "us", "ns"] | None = None
     """unit of ambiguous time stamps"""
     add_offset: float = 0.0
-    """added to their stamps, s"""
+    """time offset added to the stamps of the added trajectories, s"""
 
     def __post_init__(self) -> None:
         if not (self.sequence is None or isinstance(self.sequence, Path | Sequence | Problem)):
@@ -125,7 +125,7 @@ POSED = {
     name: getattr(RunSettings(), name)
     for name in ("preset", "features", "landmarks", "as_recorded", "held_out", "repairs", "truth")
 }
-"""settings that a problem decides: name -> the value that leaves it alone"""
+"""settings that a given problem already fixes: name -> value that changes nothing"""
 
 
 def _recorded(value: Any) -> str | int | float | bool | None:
@@ -249,7 +249,7 @@ def _require_truth_frame(settings: RunSettings) -> None:
 
 
 def _in_memory(given: Sequence | Problem, settings: RunSettings) -> Sequence:
-    """The recording that is given, or that of a problem. Raises InputError for settings that it does not have."""
+    """Recording given in memory, or that of a given problem. Raises InputError for settings that do not apply to it."""
     for name in ("time_unit", "imu", "imu_calibration", *BESIDE, *IMAGES):
         if getattr(settings, name) is not None:
             raise InputError(f"{name.replace('_', '-')}: it is for a recording in a file; leave it out")

@@ -12,9 +12,9 @@ from ..graph.gauss_newton import gauss_newton
 from ..initialization.initial_values import initial_landmarks
 
 LM_STEPS, LM_DECREASE = 100, 1e-6
-"""most steps, and the relative decrease of the cost that ends Levenberg-Marquardt near the minimum"""
+"""largest number of Levenberg-Marquardt steps, and the relative decrease of the cost at which they end"""
 LAST_STEPS, LAST_DECREASE = 50, 1e-10
-"""most undamped Gauss-Newton steps that follow, and their final relative decrease"""
+"""largest number of Gauss-Newton steps that follow, and the relative decrease of the cost at which they end"""
 NEAR, FAR = 1e-9, 1e-5
 """initial damping: nearly undamped from an estimate, damped from dead reckoning"""
 

@@ -10,7 +10,7 @@ from ..errors import IndeterminateSystemError, named_variable
 from ..graph.keys import pose_key
 
 CHECKPOINT_INTERVAL, CHECKPOINT_SHARE = 50, 0.125
-"""Updates between checkpoints: at least this number, and this share of all so far."""
+"""Updates between checkpoints: at least CHECKPOINT_INTERVAL, and CHECKPOINT_SHARE of all updates before."""
 
 
 class Update(NamedTuple):

@@ -9,7 +9,7 @@ import pytest
 
 from fgbaseline import compare, data, diagnosis, ekf, smoother
 from fgbaseline.compare import Verdict
-from fgbaseline.compare.reference_trust import TrustLimits, _above, _below, expected_observations
+from fgbaseline.compare.reference_trust import TrustLimits, _verdict_above, _verdict_below, expected_observations
 from fgbaseline.compare.residuals.cost import cost
 from fgbaseline.compare.residuals.noise_scale import expected_square, motion_scale, pixel_scale
 from fgbaseline.data import Estimate, Event, Problem, Status
@@ -252,8 +252,8 @@ def test_the_cost_is_that_of_the_four_rows_and_of_the_graph(kernel: data.HuberKe
     ("value", "high", "low"), [(2.0, 0, 1), (2.1, 1, 1), (4.0, 1, 0), (4.1, 2, 0), (1.9, 0, 2), (np.nan, 2, 2)]
 )
 def test_a_metric_at_its_limit_holds_and_a_missing_one_does_not(value: float, high: int, low: int) -> None:
-    assert _above(value, (2.0, 4.0)) == high
-    assert _below(value, (4.0, 2.0)) == low
+    assert _verdict_above(value, (2.0, 4.0)) == high
+    assert _verdict_below(value, (4.0, 2.0)) == low
 
 
 def true_answer(problem: Problem) -> Estimate:

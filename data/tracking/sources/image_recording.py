@@ -55,7 +55,7 @@ class ImageRecording:
     up_imu: FloatArray | None = None
     truth: Truth | TruthFile | None = None
     absent: tuple[str, ...] = ()
-    """files of motion that this form of recording has and that are missing"""
+    """names of the expected motion files that are missing"""
     body_T_imu: FloatArray | None = None
     """(4, 4) where a truth file has the poses of another body than the IMU"""
     remarks: tuple[str, ...] = ()
