@@ -54,7 +54,7 @@ class Point:
     spent: float = 0.0
     """processor seconds, the answer of isam2 included from which batch starts"""
     why: str = ""
-    """it was left out"""
+    """reason for which it was left out; empty if it was run"""
 
 
 def axes(quick: bool = False) -> tuple[Axis, ...]:

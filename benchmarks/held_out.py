@@ -101,7 +101,7 @@ def of_truth(sequence: Sequence, held: HeldOut, errors: compare.HeldOutErrors, v
 
 
 def differences(errors: compare.HeldOutErrors) -> dict[tuple[str, str], tuple[float, float]]:
-    """By ranking each pair alone: the second's interval behind the first, or the other way round."""
+    """Pair of names -> interval of the second minus the first in held-out error, each pair ranked alone."""
     found = {}
     for a, b in combinations(NAMES, 2):
         pair = compare.HeldOutErrors(errors.table, errors.error[[a, b]], errors.gate, errors.pieces, errors.inliers)

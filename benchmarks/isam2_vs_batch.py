@@ -34,7 +34,7 @@ DRIVES = ("town", "loop", "highway", "handheld")
 
 
 def recordings(files: tuple[Path, ...]) -> Iterator[Sequence]:
-    """Those named, or else simulated ones."""
+    """Recordings in the named files, or without files simulated drives."""
     if files:
         yield from map(data.read, files)
     else:

@@ -39,7 +39,7 @@ class Outcome:
 
 
 def cases(numbers: range, workers: int, form: Form, drawing: bool) -> Iterator[tuple[int, Ended]]:
-    """These cases, in order, as they end."""
+    """Runs the numbered cases and yields their ends in order."""
     if workers == 1:
         yield from ((number, case(number, form, drawing=drawing)) for number in numbers)
         return

@@ -16,10 +16,10 @@ from .estimate_comparison import InertialEvidence, Result, Run, known
 
 
 def samples(run: Run, result: Result) -> dict[str, dict[str, float]]:
-    """By the beginning of a metric's path: `n` of what it is taken over, and the `coverage` of the recording's time.
+    """First key of a metric's path -> its sample size `n`, and the `coverage` of the recording's time.
 
-    n are frames, of the reprojection observations, of the map landmarks, else tracks; what is not spread over time has
-    no coverage.
+    The unit of n is frames, except observations for reprojection, landmarks for the map and otherwise tracks. Landmarks
+    and tracks are not spread over time, and have no coverage.
     """
     t, evidence, table = run.problem.sequence.t, result.evidence, result.reprojection
     ranking = None if run.held_out is None else run.held_out.ranking

@@ -42,7 +42,7 @@ def _pieces(sequence: Sequence, out: Observations) -> tuple[IntArray, int]:
     """The piece (n,) of each observation of the tracks `out`, and how many there are."""
     seen = odometry(sequence)
     path = se3.compose(np.where(seen.known[:, None, None], seen.motion, np.eye(4)))
-    stretch = np.concatenate([[0], np.cumsum(~seen.known)])  # of frames whose motion the odometry determines
+    stretch = np.concatenate([[0], np.cumsum(~seen.known)])  # spans of frames between which odometry knows every motion
     number, landmark = np.unique(out.landmark * (stretch[-1] + 1) + stretch[out.frame], return_inverse=True)
     cut = Observations(out.frame, landmark.astype(np.int64), out.pixel)
     alone = replace(sequence, observations=cut, n_landmarks=len(number), truth=None)

@@ -82,7 +82,9 @@ def dynamic_landmarks(problem: Problem, estimate: Estimate, table: pd.DataFrame)
     observations = _observations_of(problem, estimate, rows, row)
     start = estimate.landmarks.position[np.searchsorted(estimate.landmarks.index, landmark)]
     standing, squared = _fitted(observations, start, np.full(n, CONVERGED))
-    converged = np.where(_significant(squared), CONVERGED, CONVERGED_STATIC)  # no more can be gained than there is
+    converged = np.where(
+        _significant(squared), CONVERGED, CONVERGED_STATIC
+    )  # an insignificant cost cannot fall significantly
     moving, left = _fitted(observations, np.concatenate([standing, np.zeros((n, 3))], axis=1), converged)
     gain = squared - left
     return pd.DataFrame(

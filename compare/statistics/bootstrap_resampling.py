@@ -13,7 +13,7 @@ CONFIDENCE = 0.95
 AT_ONCE = 500_000
 """numbers per batch: few enough to stay in the processor's cache"""
 FEW = 8
-"""number of series up to which quantiles are computed one series at a time, which is faster"""
+"""number of remaining draws at which the search for a rank ends; the quantile of each is then computed"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -54,7 +54,7 @@ class Alignment(Displayed):
     of: int = 0
     """number of pose pairs available"""
     free: tuple[str, ...] = ()
-    """what the positions leave undetermined: orientations determine such a rotation, such a scale is 1"""
+    """undetermined parameters of the positions alone: orientations determine such a rotation; such a scale is 1"""
 
     @property
     def matrix(self) -> FloatArray:

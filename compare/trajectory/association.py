@@ -37,7 +37,7 @@ class MatchedTrajectories(Displayed):
     reference: Trajectory
     """n poses"""
     estimate: Trajectory
-    """n poses, `alignment` applied; its stamps are its own, `offset` included"""
+    """n poses with `alignment` applied, at the stamps of the estimate plus `offset`"""
     association: Association
     tolerance: float
     """s"""
@@ -47,7 +47,7 @@ class MatchedTrajectories(Displayed):
     """number of reference poses without a partner"""
     left_out_estimate: int
     interpolated: str = ""
-    """the name of the trajectory that was interpolated, if one was"""
+    """name of the interpolated trajectory; empty if poses were paired by nearest stamps"""
     alignment: Alignment = field(default_factory=Alignment)
     """alignment applied to the estimate"""
 

@@ -49,7 +49,7 @@ class Entries(Displayed):
     reference: Entry
     estimates: tuple[Entry, ...]
     problem: "Problem | None"
-    """its observations are reprojected"""
+    """recording or problem whose observations are reprojected; None without"""
     held: "HeldOut | None"
     """tracks that are in no problem, to judge all paths by"""
     up: FloatArray | None

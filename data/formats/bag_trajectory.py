@@ -33,7 +33,7 @@ def read_bag_trajectory(path: Path, topic: str, name: str | None) -> ParsedTraje
     with open_bag_file(path) as bag:
         kind = _type(bag, topic)
         if kind == "nav_msgs/Path":
-            path_message = bag.last_message(topic)  # each repeats those before it
+            path_message = bag.last_message(topic)  # each message repeats the poses of the previous ones
             poses = [] if path_message is None else path_message.poses
             stamps = [pose.header.stamp.sec * 10**9 + pose.header.stamp.nanosec for pose in poses]
             rows = [_numbers(pose.pose) for pose in poses]
@@ -76,7 +76,7 @@ def _trajectory_file(
     repeated = len(rows) - len(kept)
     numbers = np.array(covariances)[kept] if covariances else None
     if numbers is not None and not numbers.any():
-        numbers = None  # as many programs leave it
+        numbers = None  # many programs publish zeros in place of a covariance
     return ParsedTrajectory(
         name,
         source,

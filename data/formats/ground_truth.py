@@ -63,7 +63,7 @@ def attach_truth(sequence: Sequence, path: FilePath | Trajectory, frame: BodyFra
 
 
 def _matched(sequence: Sequence, path: Trajectory) -> tuple[FloatArray, IntArray, list[str]]:
-    """As `_poses_of_frames` has it, of a trajectory in memory."""
+    """Poses, line numbers and remarks as of `_poses_of_frames`, from a trajectory in memory."""
     if not path.oriented:
         raise InputError("it has positions without orientations, which a run needs to bring it to its own world")
     poses, line = np.full((sequence.n_frames, 4, 4), np.nan), np.full(sequence.n_frames, -1, dtype=np.int64)

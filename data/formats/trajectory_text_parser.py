@@ -183,11 +183,13 @@ def _stated_up(lines: Lines) -> FloatArray | None:
         try:
             up = np.array(rest, dtype=np.float64)
         except ValueError:
-            continue  # the words of a sentence
+            continue  # a comment in words, not a direction
         length = float(np.linalg.norm(up))
         if not (np.isfinite(length) and length > 0.0):
             raise InputError(f"its comment '# {comment}' gives no direction; write up as x y z, such as 0 0 1")
-        return up if abs(length - 1.0) < ROUNDING else np.asarray(up / length)  # ours comes back bit by bit
+        return (
+            up if abs(length - 1.0) < ROUNDING else np.asarray(up / length)
+        )  # a unit vector is read back unchanged, to the bit
     return None
 
 

@@ -173,7 +173,7 @@ class Problem(Displayed):
     def of_chosen_features(self) -> BoolArray:
         """Mask (n,) of the sequence's observations of chosen features, masked ones included; all if none was left out.
 
-        `excluded` alone does not tell: the code of a masked observation is another one, whether or not its feature is
+        `excluded` alone does not decide: a masked observation has the code of its mask, whether or not its feature is
         chosen.
         """
         if not (self.excluded == Excluded.FEATURE_NOT_CHOSEN).any():

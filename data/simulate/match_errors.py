@@ -62,7 +62,7 @@ def displaced(pixel: FloatArray, offset: FloatArray, rig: Rig) -> FloatArray:
     """Pixels (n, 4) moved by offsets (n, 4) and kept inside the images: where they would leave, the other way."""
     bound = np.array([rig.width, rig.height, rig.width, rig.height]) - 2.0
     out = (pixel + offset < 1.0) | (pixel + offset > bound)
-    # Both rows of a pair turn together, so that left and right stay as they were to each other.
+    # Both offsets of a pair change sign together, so that their disparity and row difference remain.
     u_out, v_out = out[:, 0] | out[:, 2], out[:, 1] | out[:, 3]
     turned = np.where(np.stack([u_out, v_out, u_out, v_out], axis=1), -offset, offset)
     return np.where(offset != 0.0, np.clip(pixel + turned, 1.0, bound), pixel)

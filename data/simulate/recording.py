@@ -164,7 +164,7 @@ def _tracks(body: Path, poses: FloatArray, t: FloatArray, settings: Simulation) 
     seeing = np.ones(len(t), dtype=np.bool_)
     for start, end in settings.blackouts:
         seeing &= (t < start) | (t > end)
-    # so far inside that noise leaves no image; the same for every small noise, so that it does not change the tracks
+    # px: noise never moves a pixel out of the image; constant for small noise, so that tracks do not depend on it
     border = max(5.0, 5.0 * settings.sigma_pixel)
     sight = CameraView(rig, se3.inverse(poses @ rig.imu_T_cam), nearest, border, seeing)
     scenery = generator(settings.seed, RandomStream.SCENERY)

@@ -136,7 +136,7 @@ def followed(settings: Simulation) -> Velocities:
 
 
 def _reach(dt: FloatArray) -> float:
-    """By how many s a path through stamps with these intervals goes on beyond both ends."""
+    """Duration, s, by which a path is continued beyond both ends of stamps with intervals `dt`."""
     return MAX_TIME_OFFSET + 2.0 * float(dt.max())
 
 

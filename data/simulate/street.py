@@ -71,7 +71,7 @@ class Street:
         return points
 
     def _in_the_way(self, points: FloatArray, driven: IntArray) -> BoolArray:
-        """Which points (n,) stand within 2.5 m of where the car drives, up to 60 m before or 40 m after `driven`."""
+        """Mask (n,) of points less than 2.5 m from the path of the car, from 60 m before to 40 m after `driven`."""
         nearest = np.full(len(points), np.inf)
         ground = self._frames[:, :2, 3].copy()
         for step in range(-60, 41, 3):

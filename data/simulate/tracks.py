@@ -74,7 +74,7 @@ class _Candidates:
         return _Candidates(self.birth[chosen], self.start[chosen], self.velocity[chosen])
 
     def at(self, row: IntArray, frame: IntArray, t: FloatArray) -> FloatArray:
-        """Where the points of rows (n,) are at frames (n,): (n, 3) m."""
+        """Positions (n, 3), m, of the points in rows (n,) at frames (n,)."""
         if not self.velocity.any():
             return self.start[row]
         return self.start[row] + self.velocity[row] * (t[frame] - t[self.birth[row]])[:, None]

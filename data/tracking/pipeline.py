@@ -202,7 +202,7 @@ def _require_motion(r: ImageRecording) -> None:
 
 
 def _no_motion(r: ImageRecording) -> str | None:
-    """What a run lacks, and what to add; None where it has everything."""
+    """Sentence on missing motion data and the options that add it; None if nothing is missing."""
     absent = f"{', '.join(r.absent)} missing: " if r.absent else ""
     if r.right is None and r.imu is None:
         scale = "its images are of one camera, and only raw inertial samples determine the scale"

@@ -59,7 +59,7 @@ class TrackFile:
 
     def pieces(self) -> Iterator[Observations]:
         """Observations of some frames after the other."""
-        is_track = self._seen > 1  # what is seen once says nothing of the motion
+        is_track = self._seen > 1  # a feature observed once does not constrain the motion
         landmark_of = np.cumsum(is_track, dtype=np.int64) - 1
         offset = 0
         for first in range(0, len(self._points), FRAMES):

@@ -20,7 +20,7 @@ class Spline:
     """(4, n-1, ...) of the powers 0 to 3 of the distance from the knot where a piece begins"""
 
     def __call__(self, x: FloatArray, derivative: int = 0) -> FloatArray:
-        """Its value or a derivative (1 or 2), (..., c), at x (...); outside the knots the outer pieces go on."""
+        """Values or derivatives (order 1 or 2), (..., c), at x (...); beyond the knots those of the outer pieces."""
         piece = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(self.knots) - 2)
         c = self.coefficients
         h = (x - self.knots[piece]).reshape(*x.shape, *([1] * (c.ndim - 2)))

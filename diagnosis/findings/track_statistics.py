@@ -53,7 +53,7 @@ class TrackStatistics:
     moving: int
     """tracks that contradict the motion over `MOVING_MATCHES` intervals in succession"""
     moving_after: int
-    """the same count over the matches that repair and mask leave"""
+    """count as `moving`, over the matches that repair and mask leave"""
     gaps: IntArray
     """intervals longer than `GAP` times the median"""
 

@@ -21,9 +21,9 @@ from .track_findings import track_findings
 from .track_statistics import TrackStatistics, track_statistics
 
 MIN_SCALE = 0.02
-"""share by which velocities and stereo must disagree"""
+"""relative difference of velocity and stereo scales from which on it is a finding"""
 MIN_GYRO_SCALE = 0.25
-"""share by which angular velocities and cameras must disagree, beyond their noise"""
+"""relative difference of recorded and visual angular velocities, beyond their noise, that is a finding"""
 USUAL = (float(Shift.AFTER), float(Shift.MIDDLE))
 """intervals; shifts that are a convention and no fault"""
 KNOWN_BIAS, KNOWN_SCALE, KNOWN_ANGLE = 0.002, 0.02, np.deg2rad(0.5)
@@ -192,7 +192,7 @@ def _time_offset(diagnosis: Diagnosis) -> Finding | None:
 
 
 def _gyro_scale(diagnosis: Diagnosis) -> Finding | None:
-    """Rates that are far larger or smaller than those seen; the fit has no parameter for it."""
+    """Finding of a scale of the angular velocity, which the calibration fit does not estimate."""
     units = diagnosis.units
     if units.scale_ratios is None or "angular" in units.given:
         return None

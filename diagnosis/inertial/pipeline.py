@@ -80,7 +80,7 @@ def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
     imu = imu_intervals(sequence.imu, sequence.t)
     if baseline.doubt:
         return InertialDiagnosis(sequence, recorded, baseline.doubt, units, axes, baseline, imu, spikes=spikes)
-    if usual is not recorded:  # its camera is at the IMU
+    if usual is not recorded:  # the first odometry had the camera at the IMU
         seen = odometry(sequence)
     found = InertialDiagnosis(
         sequence,

@@ -68,7 +68,7 @@ def sensor_checks(
         turned = seen.twist(dt)[known, 3:]
         y = rate[known] - turned
         slope = np.diff(_rates_at_frames(sequence), axis=0)[known] / dt[known, None]
-        w = rate[known] - np.median(y, axis=0)  # a bias is no rotation that a scale or misalignment could show in
+        w = rate[known] - np.median(y, axis=0)  # without the bias, which scale and misalignment do not act on
         ones = np.tile(np.eye(3), (len(y), 1, 1))
         # Noise of the gyroscope shows in y as a scale of what it reads, noise of the cameras as the opposite scale of
         # what they see. The truth is between both, which are far apart where the noise is all that moves.

@@ -42,7 +42,7 @@ def closed_form(imu: ImuIntervals, rays: Rays, motions: Motions, lever: FloatArr
     direction = (R[rays.keyframe] @ rays.direction[:, :, None])[:, :, 0]
     across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
     y: FloatArray = np.zeros(UNKNOWN)
-    # Bias and gravity differ by the turning of the body only: at first gravity is what the specific force is against.
+    # Only rotation separates accelerometer bias from gravity, which at first opposes the mean specific force.
     y[GRAVITY] = -_direction(np.einsum("nij,nj->i", R[:-1], motions.velocity)) * imu.gravity
     for _ in range(ROUNDS):
         scale = weight / (ray_sigma * np.maximum(depth, NEAREST)) ** 2

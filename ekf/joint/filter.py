@@ -221,7 +221,9 @@ class JointFilter:
         state, slot = self.state, self.state.slot_of[self.feature[index]]
         charts = state.charts[slot]
         linearized = latest = predict(self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot]))
-        if self.settings.linearization is Linearization.FIRST_ESTIMATE:  # of the Jacobians only, not of the residuals
+        if (
+            self.settings.linearization is Linearization.FIRST_ESTIMATE
+        ):  # Jacobians only; residuals are at the latest estimate
             linearized = predict(
                 self.camera, self.cam_T_imu, state.predicted.pose, homogeneous(charts, state.first_estimate[slot])
             )

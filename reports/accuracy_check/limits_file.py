@@ -38,7 +38,7 @@ class Tolerance(Part):
 
     @property
     def text(self) -> str:
-        """Such as `5 % or 0.01`."""
+        """Tolerance as text, such as `5 % or 0.01`."""
         parts = [f"{100 * self.relative:.4g} %"] if self.relative else []
         parts += [f"{self.absolute:.4g}"] if self.absolute else []
         return " or ".join(parts) or "nothing"
@@ -57,7 +57,7 @@ class Limit(Part):
     """A limit on a metric of every estimator and run that the patterns match."""
 
     metric: Pattern
-    """its path below `estimators.NAME` in summary.json, such as ate.rmse"""
+    """key path of the metric below `estimators.NAME` in summary.json, such as ate.rmse"""
     estimators: Pattern | Annotated[tuple[Pattern, ...], Field(min_length=1)] = "*"
     runs: Pattern = "*"
     """pattern, for a folder with several runs"""
@@ -65,7 +65,7 @@ class Limit(Part):
     at_least: Finite | None = None
     baseline: Tolerance | None = None
     smallest_sample: Count | None = None
-    """None for that of the file"""
+    """smallest number of samples for a verdict; None for that of the file"""
     smallest_coverage: Share | None = None
     within_reference_sigma: bool = False
     """whether a bound on the divergence below the reference's own sigma leaves the limit undecided"""

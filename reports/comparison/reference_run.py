@@ -24,7 +24,7 @@ class ReferenceRun:
     """A run whose reference others are compared with, in a folder or in memory."""
 
     name: str
-    """its name in messages"""
+    """name of the run in messages"""
     reference: str
     trust: Trust
     names: tuple[str, ...]

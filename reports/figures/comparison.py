@@ -164,7 +164,7 @@ def _box(panel: Axes, y: float, values: FloatArray, color: str) -> None:
 def segments(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     """KITTI's segment errors by the length of the segments; None where none has two lengths."""
     if not any(len(means["n"]) > 1 for means in data.segments.values()):
-        return None  # the table says as much
+        return None  # the table has the same value
     figure = Figure(figsize=(style.width, 3.4 if style.titled else 1.8))
     panels = figure.subplots(1, 2)
     line = data.line(style, max(len(means["n"]) for means in data.segments.values()))

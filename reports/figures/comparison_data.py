@@ -34,7 +34,7 @@ ALIGNED = {
 }
 PAIRS = {True: "all pairs", False: "pairs end to end"}
 LENGTHS = {True: "KITTI's lengths", False: "lengths fitted to the trajectory, not KITTI's"}
-"""by whether they are KITTI's own"""
+"""whether lengths are those of the KITTI devkit -> words"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -111,7 +111,7 @@ def fill_grid(figure: Figure) -> dict[Axes, Bbox]:
 
 
 def _ticks(panels: list[tuple[Axes, SubplotSpec]]) -> list[list[float]]:
-    """Where they are: a panel of another size may have others, whose labels take another space."""
+    """Positions of the major ticks of each axis; they change with the size of a panel, and the labels with them."""
     return [axis.get_majorticklocs().tolist() for axes, _ in panels for axis in (axes.xaxis, axes.yaxis)]
 
 
@@ -186,7 +186,7 @@ def draw_minor_ticks_at_once(panels: Iterable[Axes]) -> None:
     As ticks each is five artists, which are measured and drawn in every form whether they show or not.
     """
     bare = [(axes, axis, _unlabeled(axis)) for axes in panels for axis in (axes.xaxis, axes.yaxis)]
-    for axes, axis, at in bare:  # panels that share an axis share its locator too: all are asked before
+    for axes, axis, at in bare:  # read before any is changed: panels that share an axis share its locator
         if len(at) == 0:
             continue
         axis.set_minor_locator(NullLocator())

@@ -17,7 +17,7 @@ from .palette import BAND, GRAY
 from .style import Line, Style, safe_text
 
 DECADES = 1.5
-"""between what the estimators reach, from which on an axis is logarithmic"""
+"""spread of the estimators' maxima, in decades, above which an axis is logarithmic"""
 DEGREES_OF_FREEDOM = 6.0
 """degrees of freedom of a pose"""
 CONSISTENT = "95 % if consistent (dotted: median)"

@@ -36,7 +36,7 @@ class RunData:
     by_products: frozenset[str]
     """estimators that the reference's own run gave, as far as that is known"""
     trust: str
-    """in the reference, in one word"""
+    """trust in the reference: trusted, doubtful or untrusted"""
     t: FloatArray
     """(T,) s since the first frame"""
     paths: Mapping[str, FloatArray]

@@ -28,7 +28,7 @@ class Stage:
 
 
 def diagnosed_stages(diagnosis: Diagnosis) -> list[Stage]:
-    """As recorded, then after the repair of each significant fault: axes, bias, interval, and tracks."""
+    """Stages of a diagnosed recording: as recorded, then with one more fault repaired: axes, bias, interval, tracks."""
     recorded = diagnosis.sequence
     stages = [Stage(AS_RECORDED, "", recorded)]
     if diagnosis.fit is None:

@@ -21,7 +21,7 @@ OF_THE_RUN = ("run", "case", "sequence", "seed", "reference", "trust", "frames",
 COSTS = ("run", "case", "estimator", "frames", "observations", "seconds", "memory_mb")
 ANSWERED = ("ok", "recovered")
 BENCH_METRICS = tuple(metric for metric in METRICS if metric.name)
-"""those that a bench has a column for in its CSV tables"""
+"""metrics that the CSV tables of a bench have as columns"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -44,12 +44,12 @@ class Results:
 
     @property
     def cases(self) -> list[str]:
-        """Their names in the suite's order."""
+        """Names of the cases in the suite's order."""
         return list(dict.fromkeys(planned.case for planned in self.planned))
 
     @property
     def estimators(self) -> list[str]:
-        """Their names in the suite's order."""
+        """Names of the estimators in the suite's order."""
         return list(self.planned[0].job.estimators)
 
     @property

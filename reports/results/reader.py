@@ -139,7 +139,7 @@ class RunFolder:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """`summary.json` or `comparison.json` as it is."""
+        """Content of `summary.json` or `comparison.json` as a dict."""
         return read_document(self.folder / self.mark)
 
     def trajectory(self, name: str) -> Trajectory:

@@ -102,7 +102,9 @@ def _series(run: Run, result: Result) -> pd.DataFrame:
     With raw inertial data also velocity and biases: see `InertialEvidence.series`.
     """
     T = run.problem.n_frames
-    stamps = [repr(t) for t in run.problem.sequence.t.tolist()]  # in full: nine digits of a Unix time are seconds
+    stamps = [
+        repr(t) for t in run.problem.sequence.t.tolist()
+    ]  # all digits: nine of a Unix time would be whole seconds
     table = pd.DataFrame({"t": stamps}, index=pd.RangeIndex(T, name="frame"))
     for prefix, errors in (("divergence", result.divergence), ("truth", result.truth)):
         if errors is not None:
@@ -116,7 +118,7 @@ def _series(run: Run, result: Result) -> pd.DataFrame:
 
 
 def _consistency(result: Result) -> pd.DataFrame:
-    """By frame: state of the covariance, NEES against truth and reference, sigma ratios, NIS and its degrees."""
+    """Table with a row per frame: state of the covariance, NEES to truth and reference, sigma ratios, NIS."""
     evidence, recorded = result.evidence, result.estimate.innovations
     words = [CovarianceState(state).name.lower().replace("_", " ") for state in evidence.covariance]
     table = pd.DataFrame({"covariance": words}, index=pd.RangeIndex(len(words), name="frame"))

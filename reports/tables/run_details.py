@@ -46,7 +46,7 @@ CONDITIONS: Mapping[str, str] = {
         "Bias and time offset: without and with this repair, the others of the angular velocity applied.",
     ),
 }
-"""which other repairs are applied where a finding is measured, by its code"""
+"""codes of findings -> sentence on the other repairs that are applied where they are measured"""
 
 
 def trust_table(criteria: Iterable[Criterion]) -> Table:

@@ -119,7 +119,7 @@ class CheckpointedFixedLag:
         params = self._settings.params(self._baseline)
         params.findUnusedFactorSlots = True
         params.enableRelinearization = True
-        params.relinearizeSkip = 1  # what leaves the window has no later chance, and most of the time goes elsewhere
+        params.relinearizeSkip = 1  # marginalized variables cannot be relinearized later, and it is cheap
         if qr:
             params.setFactorization("QR")
         return gtsam.IncrementalFixedLagSmoother(self._lag, params)
@@ -129,7 +129,7 @@ class CheckpointedFixedLag:
         for i in range(factors.size()):
             factor = factors.at(i)
             if isinstance(factor, gtsam.LinearContainerFactor):
-                # Nothing keeps the point fixed in the new one: the marginal must know it.
+                # The rebuilt smoother may relinearize its variables, so the marginal needs its linearization point.
                 point = checkpoint.linearization_point
                 factor = gtsam.LinearContainerFactor(factor.linearize(point), point)
             graph.add(factor)

@@ -116,7 +116,7 @@ def _conditionals(net: gtsam.GaussianBayesNet) -> list[_Conditional]:
     each = [net.at(i) for i in range(net.size())]
     R = [np.array(conditional.R()) for conditional in each]
     inverse: list[FloatArray] = [np.empty(0)] * len(each)
-    for d in {len(r) for r in R}:  # many at once cost little more than one
+    for d in {len(r) for r in R}:  # one call inverts a stack: most of its time is overhead
         chosen = [i for i, r in enumerate(R) if len(r) == d]
         for i, r in zip(chosen, np.linalg.inv(np.array([R[i] for i in chosen])), strict=True):
             inverse[i] = r

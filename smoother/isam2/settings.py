@@ -67,7 +67,7 @@ class ISAM2Settings:
                 baseline,
             )
         )
-        params.enableRelinearization = False  # but where an update asks for it
+        params.enableRelinearization = False  # only at updates that force it
         params.setOptimizationParams(gtsam.ISAM2GaussNewtonParams(WILDFIRE_THRESHOLD * min(2.0 * baseline, 1.0)))
         params.setFactorization("QR" if self.qr else "CHOLESKY")
         return params

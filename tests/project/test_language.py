@@ -49,7 +49,9 @@ def test_british_words_are_recognized(word: str) -> None:
 
 
 def test_docstrings_start_with_their_subject_and_name_no_persons() -> None:
-    begin = re.compile(r"(([Oo]f|[Tt]he same|[Aa]nd)|(times|what|how far|that|whose|from which|up to which))\b")
+    begin = re.compile(
+        r"(([Oo]f|[Tt]he same|[Aa]nd)|(times|what|how far|that|those|these|which|whose|its?|from which|up to which))\b"
+    )
     found = [
         f"{path.relative_to(ROOT)}:{line}: {text.splitlines()[0]}"
         for path in sources()

@@ -103,7 +103,7 @@ def _form(folder: Path) -> Callable[..., ImageRecording] | None:
     """Reader of the form that a folder has by the names in it; None where it has none or cannot be read."""
     try:
         inside = {place.name for place in folder.iterdir() if place.is_dir()}
-    except OSError:  # also where it is a file
+    except OSError:  # unreadable, or a file
         return None
     if inside & {"mav0", "cam0", "cam1"}:
         return open_euroc
