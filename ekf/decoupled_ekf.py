@@ -28,11 +28,13 @@ eigenvalue: eps times the condition against one over the condition."""
 def ekf(problem: Problem, progress: Progress | None = None) -> Estimate:
     """EKF SLAM of the source paper, with separate covariances of pose and landmarks.
 
-    At frame 0 the landmarks are updated; at frame k >= 1: predict with u_(k-1) (equation 9) or the inertial samples
-    since frame k-1, update the pose (with inertial samples the velocity and the biases as well) with
-    the landmarks as they stand (13), update the landmarks with the updated pose (11, 12; skipped where the problem's
-    reading holds them at the mapping's). Frames where the covariance as printed is no longer positive definite (a
-    numerically singular innovation covariance) become events, and the status is then `recovered`.
+    Frame 0 updates the landmarks. Each frame k >= 1 predicts with u_(k-1) (equation 9) or the inertial samples since
+    frame k-1, updates the pose, and with inertial samples velocity and biases, with landmarks taken as known (13), and
+    then updates the landmarks with the pose taken as known (11, 12). With `LandmarkMode.FIXED` landmarks stay as mapped
+    along the dead-reckoned path.
+
+    A frame whose printed covariance (I - K H) Sigma is not positive definite, because the innovation covariance is
+    numerically singular, becomes an event, and the status is `recovered`.
     """
     if len(problem.observations()) == 0:
         return Estimate.failed("ekf", "no observations", problem.n_frames, len(problem.excluded))

@@ -69,7 +69,7 @@ class Recovery(NamedTuple):
 
 
 def add_with_recovery(graph: IncrementalGraph, update: FrameUpdate) -> Recovery:
-    """Add a frame; where the system is indeterminate, without suspect landmarks, then without observations.
+    """Add a frame; if the system is indeterminate, without suspect landmarks, and at last without observations.
 
     Raises UnrecoverableError.
     """

@@ -33,7 +33,7 @@ class GraphBuilder:
         self.factors = FactorBuilder(problem)
         self.uninitialized = UninitializedLandmarks(problem, self.observations, criterion)
         self.online = FrameStates.unknown(problem)
-        """states as estimated online; the solver fills them, and `landmark_position`"""
+        """causal estimates: the state of frame k from data up to k. The solver sets these, and `landmark_position`."""
         self.landmark_position: dict[int, FloatArray] = {}
         """landmark -> position (3,), m, as estimated at its latest observation"""
         self.current_poses: Callable[[IntArray], FloatArray] | None = None
@@ -74,7 +74,7 @@ class GraphBuilder:
         return factor
 
     def _windowed_states(self, k: int, first_frame: int) -> FrameStates:
-        """States of which the last are optimized on the images, where frame k observes no known landmark.
+        """Online states, the last of them optimized in a window of frames, as frame k observes no known landmark.
 
         At the start or after a gap no landmark corrects the dead-reckoned path. Landmarks triangulated along it would
         be so far off that the first Gauss-Newton step moves some behind the cameras and bends the path.

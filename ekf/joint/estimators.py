@@ -131,7 +131,7 @@ def _bias_events(bias: GyroBias) -> list[Event]:
     k = int(answered[-1])
     found = zip(bias.mean[k], np.sqrt(np.diagonal(bias.covariance[k])), strict=True)
     text = ", ".join(f"{mean:+.4f} ± {deviation:.4f}" for mean, deviation in found)
-    return [Event(k, EventKind.GYROSCOPE_BIAS, f"at rest the gyroscope reads ({text}) rad/s on the IMU's axes")]
+    return [Event(k, EventKind.GYROSCOPE_BIAS, f"gyroscope bias ({text}) rad/s in the axes of the IMU")]
 
 
 def _status(failure: str, joint: JointFilter, n_frames: int) -> tuple[Status, str]:

@@ -11,9 +11,9 @@ from fgbaseline.data.observations import BoolArray, IntArray
 
 from .landmark_representation import WorldPoints
 
-AT_INFINITY = "its observations put it at infinity or beyond"
-FULL = "the state was full while it was seen"
-NOT_INITIALIZED = "no frame that was believed saw it"
+AT_INFINITY = "its estimate was at infinity or beyond"
+FULL = "the state was full while it was observed"
+NOT_INITIALIZED = "no accepted frame observed it"
 
 
 class LandmarkMap:

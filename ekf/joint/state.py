@@ -19,6 +19,7 @@ from .landmark_representation import WorldPoints, generators, motion_jacobian, w
 from .update import subtract_symmetric
 
 ABSENT = -1
+"""slot of a landmark that is not in the state"""
 
 
 class CommonError(NamedTuple):
@@ -98,9 +99,9 @@ class JointState:
         """Landmark charts (count, 4, 4), a view."""
         return self._charts[: self.count]
 
-    def correct_landmarks(self, by: FloatArray) -> FloatArray:
-        """Add `by` (count, 3) to the landmark coordinates; return the change (count, 3, 6) of `motion_jacobian`."""
-        self.xi[:] += by
+    def correct_landmarks(self, steps: FloatArray) -> FloatArray:
+        """Add `steps` (count, 3) to the landmark coordinates; return the change (count, 3, 6) of `motion_jacobian`."""
+        self.xi[:] += steps
         before = self._motion_jacobian[: self.count]
         now = motion_jacobian(self._slot_generators[: self.count], self.xi)
         change = now - before
@@ -137,9 +138,10 @@ class JointState:
         covariance: FloatArray,
         common: CommonError | None = None,
     ) -> None:
-        """Initialize n landmarks in one chart (4, 4), with the error G delta + e each, and B c where it is `common`.
+        """Initialize n landmarks `row` (n,) at coordinates xi (n, 3) in one chart (4, 4).
 
-        G = `pose_jacobian` (n, 3, 6) maps the pose error delta, `covariance` (n, 3, 3) is that of e.
+        The error of a landmark is G delta + e, and with `common` G delta + e + B c: delta is the error of the pose,
+        G = `pose_jacobian` (n, 3, 6), e has `covariance` (n, 3, 3), B and c are those of `CommonError`.
         """
         n, old, new = len(row), self.size, self.size + 3 * len(row)
         while self.count + n > len(self._feature):
@@ -170,6 +172,7 @@ class JointState:
         left = self.count - len(leaving)
         goes: BoolArray = np.zeros(self.count, dtype=np.bool_)
         goes[leaving] = True
+        # The last landmarks move into the free slots, so that the others need not.
         holes = np.flatnonzero(goes[:left])
         movers = left + np.flatnonzero(~goes[left:])
         for array in self._slot_arrays():

@@ -23,7 +23,7 @@ from fgbaseline.geometry.measurement_model import mahalanobis_squared
 from ..motion_model import POSE
 
 PANEL = 192
-"""rows or columns that are worked on at a time"""
+"""block size of matrix products, rows or columns: a block stays in the cache"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -33,11 +33,11 @@ class StackedJacobian:
     slot: IntArray
     """(n,) slot of the observed landmark"""
     pose_jacobian: FloatArray
-    """(n, r, 6)"""
+    """(n, r, 6) w.r.t. the right perturbation [v, w] of the pose"""
     landmark_jacobian: FloatArray
-    """(n, r, 3)"""
+    """(n, r, 3) w.r.t. the coordinates of the landmark in its chart"""
     n_body: int = POSE
-    """offset of the landmarks; columns between pose and landmarks (the bias) are zero"""
+    """offset of the landmarks in the error state; columns between pose and landmarks (velocity, biases) are zero"""
 
     def multiply(self, matrix: FloatArray) -> FloatArray:
         """Product H A (rn, c) with a matrix A (size, c)."""
@@ -180,8 +180,8 @@ class Innovation:
 def kalman_update(innovation: Innovation, factor: CholeskyFactor, P: FloatArray) -> FloatArray:
     """Kalman update: returns the correction delta (size,) of the error state; P (size, size) is updated in place.
 
-    `factor` is that of S with the weighted R. `innovation.HP` is overwritten, also as a view of that of
-    another innovation.
+    `factor` is the factor of S with the weighted R. `innovation.HP` is overwritten, and with it the arrays of which it
+    is a view.
     """
     W_transposed = dtrsm(1.0, factor.L, innovation.HP.T, side=1, lower=1, trans_a=1, overwrite_b=1)
     delta: FloatArray = W_transposed @ factor.whitened

@@ -91,9 +91,9 @@ class CheckpointedISAM2:
 
 
 class _Groups:
-    """GTSAM's map of the elimination groups, in which the changes from one update to the next are set.
+    """Elimination groups as GTSAM's map, to which only the changes between two updates are applied.
 
-    There are hundreds of groups and a dozen changes; every one set is a call of GTSAM.
+    Every change is a call of GTSAM, and a dozen of hundreds of entries change.
     """
 
     def __init__(self) -> None:

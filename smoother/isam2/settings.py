@@ -42,18 +42,19 @@ class ISAM2Settings:
     relinearize_skip: int = 3
     """updates from one relinearization to the next; the fixed-lag smoother relinearizes at each"""
     relinearize_all_skip: int = 3
-    """updates from one relinearization of the whole tree to the next; between them only what was last observed in the
-    last `recent_frames` frames is relinearized"""
+    """updates from one relinearization of the whole tree to the next; between them only recent variables are
+    relinearized"""
     recent_frames: int = 10
+    """frames since its last observation up to which a variable is recent"""
     initialization: InitializationCriterion = field(default_factory=InitializationCriterion)
     relinearize_at_end: bool = True
     """whether Gauss-Newton steps over the whole graph follow the last frame"""
     qr: bool = False
     """whether QR replaces Cholesky: three times slower, and robust to pivots of very unequal size"""
     tree_frames: int = 600
-    """frames in the tree at which those before the last `kept_frames` are marginalized into a linear prior; frames of
-    tracks that continue are kept"""
+    """number of frames in the tree at which the older ones are marginalized into a linear prior"""
     kept_frames: int = 200
+    """number of last frames that are kept; so are all earlier frames that continuing tracks begin in"""
 
     def params(self, baseline: float) -> gtsam.ISAM2Params:
         """GTSAM parameters for a rig with this baseline (m)."""
@@ -76,8 +77,8 @@ class ISAM2Settings:
     def of(cls, problem: Problem) -> "ISAM2Settings":
         """Default settings for a problem.
 
-        With raw inertial data a frame bends the path behind it by more than the thresholds, and all of the tree would
-        be relinearized again and again: it is shorter, and relinearizes less often.
+        With raw inertial data every frame changes earlier poses by more than the thresholds, so that each update would
+        relinearize the whole tree. The tree is therefore shorter, and relinearized less often.
         """
         if problem.imu is None:
             return cls()

@@ -571,7 +571,7 @@ def test_deferred_landmarks_are_counted_in_every_frame_and_reported_at_their_las
     estimate = ekf.joint_ekf(plain_problem(at_infinity(0.0)), settings=JointSettings.textbook())
     said = (f"2 of {2 if k else 12} observations rejected" for k in range(10))
     put_off = [data.Event(k, EventKind.INITIALIZATION_DEFERRED, text) for k, text in enumerate(said)]
-    never = [data.Event(9, EventKind.LANDMARK_NEVER_DETERMINED, "no frame that was believed saw it", j) for j in (0, 1)]
+    never = [data.Event(9, EventKind.LANDMARK_NEVER_DETERMINED, "no accepted frame observed it", j) for j in (0, 1)]
     assert list(estimate.events) == [*put_off, *never]
 
 

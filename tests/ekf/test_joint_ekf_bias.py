@@ -161,7 +161,7 @@ def test_the_bias_is_an_event_with_its_sigma_on_each_axis() -> None:
     deviation = np.sqrt(np.diagonal(estimate.gyro_bias.covariance[-1]))
     said = ", ".join(f"{m:+.4f} ± {d:.4f}" for m, d in zip(estimate.gyro_bias.mean[-1], deviation, strict=True))
     assert estimate.events[-1] == data.Event(
-        49, "estimated gyroscope bias", f"at rest the gyroscope reads ({said}) rad/s on the IMU's axes"
+        49, "estimated gyroscope bias", f"gyroscope bias ({said}) rad/s in the axes of the IMU"
     )
     assert estimate.gyro_bias.mean.shape == (50, 3)
     assert np.isfinite(estimate.gyro_bias.covariance).all()

@@ -66,7 +66,7 @@ def test_many_landmarks_at_once_leave_a_consistent_covariance(cap: int) -> None:
     assert sum(left_out.values()) == np.count_nonzero(~used)
     assert estimate.status is Status.RECOVERED
     assert f"the state was full: {np.count_nonzero(~used)} observations were not used" in estimate.reason
-    never = {e.landmark for e in estimate.events if e.reason == "the state was full while it was seen"}
+    never = {e.landmark for e in estimate.events if e.reason == "the state was full while it was observed"}
     assert never == set(np.setdiff1d(o.landmark, o.landmark[used]).tolist())
 
 
