@@ -232,8 +232,10 @@ def _with_doubt(each: Resolved, assumed: float, other: float) -> Resolved:
     fits = f"its rotations fit to {assumed:.3g}° in the median as {orders[0]}, to {other:.3g}° as {orders[1]}"
     if np.isnan(assumed):
         fits = "its body hardly moves"
-    said = f"no header names the order of its quaternions, and {fits}: {orders[0]} is assumed; --quaternion settles it"
-    return replace(each.remarked(said), order_in_doubt=True)
+    unnamed = "no header names the order of its quaternions"
+    return replace(
+        each.remarked(f"{unnamed}, and {fits}: {orders[0]} is assumed; --quaternion settles it"), order_in_doubt=True
+    )
 
 
 def paired(

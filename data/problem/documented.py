@@ -29,8 +29,8 @@ def documented(
     require_scale(sequence)
     if sequence.imu is not None:
         raise InputError(
-            "documented: the preset poses the report's problem, which has body velocities and no raw inertial data; "
-            "use --preset calibrated"
+            "documented: the preset is the problem of the source paper, which has body velocities and no raw inertial "
+            "data; use --preset calibrated"
         )
     o = sequence.observations
     chosen = most_observed(o, sequence.n_landmarks, features)

@@ -78,7 +78,7 @@ class ImuIntervals(Displayed):
         return slice(int(self.starts[k]), int(self.starts[k + 1]))
 
     def motion(self, k: int, gyroscope_bias: FloatArray, accelerometer_bias: FloatArray) -> strapdown.PreintegratedImu:
-        """Motion from frame k to k + 1 with the biases (3,) taken off the samples."""
+        """Motion from frame k to k + 1 with the biases (3,) subtracted from the samples."""
         at = self.pieces(k)
         return strapdown.integrate(
             self.angular_velocity[at] - gyroscope_bias,

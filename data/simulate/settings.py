@@ -83,7 +83,7 @@ class Simulation:
     along: Sequence | Velocities | None = None
     """recording or velocities to follow on the path `along`: taken as true, each constant until the next frame"""
     along_gyro_bias: Vector = (0.0, 0.0, 0.0)
-    """rad/s, taken off the angular velocities of `along` first: a recorded bias would roll the street over"""
+    """rad/s, subtracted from the angular velocities of `along` first: a recorded bias would roll the street over"""
     duration: float | None = None
     """s; 60, or all of `along`"""
     frame_rate: float | None = None

@@ -87,24 +87,24 @@ def _accelerometer(checks: SensorChecks) -> str:
 
 def inertial_sentences(found: InertialDiagnosis) -> tuple[str, ...]:
     """Start, sensors and pixel noise, one sentence each."""
-    said = []
+    sentences = []
     if found.start is not None:
         state, deviation = found.start.state, np.sqrt(np.diag(found.start.state.covariance))
-        said.append(
+        sentences.append(
             f"Start ({state.source}): velocity {vector(state.velocity, 3)} m/s, standard errors "
             f"{vector(deviation[6:9], 3)}; tilt known to {np.rad2deg(np.linalg.norm(deviation[3:6])):.2f}°."
         )
     checks = found.sensors
     if checks is not None and checks.determined:
         scale, error = checks.gyroscope_scale
-        said.append(
+        sentences.append(
             f"Gyroscope against the cameras: bias {vector(checks.gyroscope_bias[0], 4)} rad/s, offset "
             f"{1e3 * checks.time_offset[0]:.1f} ms, scale {scale:.3f} (standard error {error:.3f})"
             f"{_accelerometer(checks)}."
         )
     if found.monocular is not None:
         remark = found.monocular.remark
-        said.append(f"{remark[0].upper()}{remark[1:]}.")
+        sentences.append(f"{remark[0].upper()}{remark[1:]}.")
     if found.pixel_found:
-        said.append(f"Noise (1-sigma): {found.pixel:.2f} px of a pixel row.")
-    return tuple(said)
+        sentences.append(f"Noise (1-sigma): {found.pixel:.2f} px of a pixel row.")
+    return tuple(sentences)

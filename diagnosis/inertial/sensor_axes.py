@@ -91,15 +91,17 @@ def axes_findings(axes: SensorAxes) -> tuple[Finding, ...]:
     gyroscope = axes.gyroscope
     if gyroscope is not None and gyroscope.changed:
         text = f"The gyroscope is recorded in other axes: the axes of imu_T_cam are its ({gyroscope.name})."
-        said = f"log-likelihood {number(round(gyroscope.margin))} above the next convention"
-        found.append(Finding("angular_axes", text, gyroscope.before, gyroscope.after, "rad/s", said))
+        certainty = f"log-likelihood {number(round(gyroscope.margin))} above the next convention"
+        found.append(Finding("angular_axes", text, gyroscope.before, gyroscope.after, "rad/s", certainty))
     if axes.force_changed:
         sign = "with the opposite sign" if axes.sign < 0.0 else ""
         other = f"in other axes: those of imu_T_cam are its ({axes.accelerometer})"
         how = " and ".join(part for part in (sign, other if axes.accelerometer != IDENTITY else "") if part)
         text = f"The accelerometer is recorded {how}."
-        said, figures, unit = "correlation with the accelerations that the cameras see", axes.correlation, "correlation"
+        certainty = "correlation with the accelerations that the cameras see"
+        figures, unit = axes.correlation, "correlation"
         if axes.misfit is not None:
-            said, figures, unit = "residual of tracks along the motion in closed form", axes.misfit, "px"
-        found.append(Finding("accelerometer_axes", text, *figures, unit, said))
+            certainty = "residual of tracks along the motion in closed form"
+            figures, unit = axes.misfit, "px"
+        found.append(Finding("accelerometer_axes", text, *figures, unit, certainty))
     return tuple(found)

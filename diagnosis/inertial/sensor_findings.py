@@ -34,8 +34,8 @@ def _gyroscope(checks: SensorChecks) -> list[Finding]:
     bias, deviation = checks.gyroscope_bias
     if any(_significant(b, d, MIN_BIAS) for b, d in zip(bias, deviation, strict=True)):
         text = f"Gyroscope bias {vector(bias, 4)} rad/s: it is in the state of the estimators."
-        said = f"standard errors {vector(deviation, 4)} rad/s"
-        found.append(Finding("gyro_bias", text, before, after, "rad/s", said))
+        certainty = f"standard errors {vector(deviation, 4)} rad/s"
+        found.append(Finding("gyro_bias", text, before, after, "rad/s", certainty))
     angle, deviation = checks.misalignment
     if any(_significant(a, d, MIN_ANGLE) for a, d in zip(angle, deviation, strict=True)):
         size = float(np.rad2deg(np.linalg.norm(angle)))
@@ -43,8 +43,8 @@ def _gyroscope(checks: SensorChecks) -> list[Finding]:
             f"imu_T_cam is turned against the gyroscope by {size:.2f}°: about x, y and z by "
             f"{vector(np.rad2deg(angle), 2)}°."
         )
-        said = f"standard errors {vector(np.rad2deg(deviation), 2)}°"
-        found.append(Finding("extrinsic", text, size, size, "°", said))
+        certainty = f"standard errors {vector(np.rad2deg(deviation), 2)}°"
+        found.append(Finding("extrinsic", text, size, size, "°", certainty))
     offset, error = checks.time_offset
     if _significant(offset, error, MIN_OFFSET):
         when = "after" if offset > 0.0 else "before"
@@ -97,6 +97,6 @@ def _noise(checks: SensorChecks, densities: tuple[float, float]) -> list[Finding
                 f"At rest ({rest.duration:.1f} s) the {name} has {density:.3g} {unit}, {density / stated:.1f} times "
                 f"the stated {stated:.3g}: vibration, or a density from a bench."
             )
-            said = f"Allan deviation at {rest.averaging:.3g} s"
-            found.append(Finding(f"{name}_noise", text, density, density, unit, said))
+            certainty = f"Allan deviation at {rest.averaging:.3g} s"
+            found.append(Finding(f"{name}_noise", text, density, density, unit, certainty))
     return found

@@ -121,5 +121,6 @@ def imu_unit_findings(units: ImuUnits) -> tuple[Finding, ...]:
 def require_si(sequence: Sequence, findings: tuple[Finding, ...]) -> None:
     """Raises InputError where a recording that is taken as recorded has `findings` on its units."""
     if findings:
-        said = " ".join(finding.sentence.split(":")[0] + f" ({finding.certainty})." for finding in findings)
-        raise InputError(f"{sequence.source}: {said} Convert them, or run without --as-recorded, which repairs them")
+        sentences = " ".join(finding.sentence.split(":")[0] + f" ({finding.certainty})." for finding in findings)
+        remedy = "Convert them, or run without --as-recorded, which repairs them"
+        raise InputError(f"{sequence.source}: {sentences} {remedy}")

@@ -79,7 +79,7 @@ def fit_windows(
     mean, error = _agreed(fits)
     unbroken = windows_of(sequence, odometry, twist, unbroken_spans(odometry), deviation)
     inflation = inflation_of(sequence, unbroken, mean, sigmas, processes)
-    believed = NoiseSettings(
+    noise = NoiseSettings(
         sigmas.pixel * inflation.pixel,
         sigmas.linear_velocity * inflation.velocity,
         sigmas.angular_velocity * inflation.velocity,
@@ -88,7 +88,7 @@ def fit_windows(
     if sigmas.angular_velocity > FLOOR.angular_velocity:
         error = error * _widening(np.where(np.isnan(residual), 0.0, redundancy))
     motion = residual / np.repeat([sigmas.linear_velocity, sigmas.angular_velocity], 3) / np.sqrt(redundancy)
-    return CalibrationFit(believed, mean, error, len(fits), inflation, sigmas, motion)
+    return CalibrationFit(noise, mean, error, len(fits), inflation, sigmas, motion)
 
 
 def _widening(redundancy: FloatArray) -> float:

@@ -128,7 +128,7 @@ class Repairs(_Overrides):
     linear_axes: Annotated[str, PlainValidator(_axes)] | None = None
     """convention of the recorded linear velocity"""
     gyro_bias: Annotated[Vector, PlainValidator(_vector(10.0, "rad/s"))] | None = None
-    """rad/s, what the gyroscope reads at rest, in recorded axes; taken off"""
+    """rad/s, gyroscope bias (its reading at rest) in recorded axes; subtracted"""
     velocity_scale: Annotated[float, PlainValidator(_between(0.01, 100.0, 1.0))] | None = None
     """recorded over true linear velocity; divided by"""
     time_offset_s: Annotated[float, PlainValidator(_between(-1e3, 1e3, 0.0))] | None = None
@@ -142,7 +142,7 @@ class Repairs(_Overrides):
     replace_outliers: bool | None = None
     """false: velocity samples that contradict the cameras and their neighbors are used as recorded"""
     disparity_offset_px: Annotated[float, PlainValidator(_between(-100.0, 100.0, 0.0))] | None = None
-    """px by which every recorded uR is too large, and every disparity too small; taken off"""
+    """px by which every recorded uR is too large, and every disparity too small; subtracted from uR"""
     units: UnitOverrides = UnitOverrides()
     sigma: SigmaOverrides = SigmaOverrides()
     mask: MaskOverrides = MaskOverrides()

@@ -69,13 +69,13 @@ def matching(limits: TomlFile[Limits], index: int, measured: Measured) -> list[t
     limit = limits.content.limit[index]
     runs = {name: run for name, run in measured.runs.items() if fnmatchcase(name, limit.runs)}
     if not runs:
-        said = f'runs = "{limit.runs}" matches no run in {shown(measured.path)}; there are {", ".join(measured.runs)}'
-        raise limits.wrong(("limit", index, "runs"), said)
+        reason = f'runs = "{limit.runs}" matches no run in {shown(measured.path)}; there are {", ".join(measured.runs)}'
+        raise limits.wrong(("limit", index, "runs"), reason)
     there = sorted({name for run in runs.values() for name in run.estimators})
     for pattern in limit.patterns:
         if not any(fnmatchcase(name, pattern) for name in there):
-            said = f'estimators = "{pattern}" matches no estimator; there are {", ".join(there)}'
-            raise limits.wrong(("limit", index, "estimators"), said)
+            reason = f'estimators = "{pattern}" matches no estimator; there are {", ".join(there)}'
+            raise limits.wrong(("limit", index, "estimators"), reason)
     chosen = {
         (name, estimator): values
         for name, run in runs.items()
@@ -84,8 +84,8 @@ def matching(limits: TomlFile[Limits], index: int, measured: Measured) -> list[t
     }
     if not any(failure(values) or has_metric(values, limit.metric) for values in chosen.values()):
         known = sorted({metric for values in chosen.values() for metric in metrics_of(values)})
-        said = f'metric = "{limit.metric}" is not a number of any matching estimator; there are '
-        raise limits.wrong(("limit", index, "metric"), said + nearest(limit.metric, known))
+        reason = f'metric = "{limit.metric}" is not a number of any matching estimator; there are '
+        raise limits.wrong(("limit", index, "metric"), reason + nearest(limit.metric, known))
     return list(chosen)
 
 

@@ -1,4 +1,4 @@
-"""Figures of a reproduction: the report's 1 to 9 as it has them, the sweep over features and noise, and the causes.
+"""Figures of a reproduction: figures 1 to 9 of the source paper, the sweep over features and noise, and the causes.
 
 The source paper's figures show x and y of the world, the path red, its ends marked, arrows, and green landmarks.
 """
@@ -35,11 +35,11 @@ DEAD_RECKONING, BROKEN = "#444444", "#b3261e"
 ARROWS = 50
 """along a path"""
 SIDE, HEAD = 6.4, 1.35
-"""inches: width of a figure of the report's kind, and height of everything around its picture"""
+"""inches: width of a figure as in the source paper, and height of everything around its picture"""
 AROUND = 0.25
 """share of the path's extent: landmarks farther off are counted and not shown"""
 SQUARE = (0.6, 1.0 / 0.6)
-"""height over width of a picture of the report's kind, at least and at most"""
+"""height over width of a picture as in the source paper, at least and at most"""
 TITLE = 62
 """letters of a line of a title"""
 COLUMNS = 2
@@ -90,7 +90,7 @@ def numbered(study: "Study") -> dict[str, DrawOne]:
 
 
 def plot(title: str, path: FloatArray, *, arrows: bool = False, landmarks: FloatArray | None = None) -> Figure:
-    """Figure of the report's kind, of a path (T, 4, 4) and landmarks (m, 3) in the world."""
+    """Figure as in the source paper, of a path (T, 4, 4) and landmarks (m, 3) in the world."""
     figure = Figure(figsize=(SIDE, SIDE))
     axes = figure.subplots()
     xy = path[:, :2, 3]
