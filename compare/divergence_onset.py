@@ -17,7 +17,7 @@ FAR = 5.0
 FAR_SHARE = 0.01
 """largest threshold, as a share of the reference path"""
 AROUND = 1.0
-"""s before and after the onset"""
+"""s, half width of the interval around the onset in which wrong matches are counted"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class DivergenceOnset:
     frame: int
     seconds: float
     beyond: float
-    """share of the later frames with a pose that are beyond the threshold"""
+    """share of the frames from here on, of those with a pose, that are beyond the threshold"""
     wrong: float | None
     """`wrong_share` within `AROUND`; None without a mask"""
 

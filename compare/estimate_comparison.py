@@ -39,7 +39,7 @@ class Evidence(Displayed):
     """
 
     covariance: NDArray[np.uint8]
-    """(T,) a `compare.CovarianceState` each"""
+    """(T,) `compare.CovarianceState` of each frame"""
     error: FloatArray | None
     """(T, 6) in the body frame: see `compare.body_error`"""
     nees: pd.DataFrame | None
@@ -47,9 +47,9 @@ class Evidence(Displayed):
     difference: compare.ReferenceNees | None
     """NEES of the difference from the reference"""
     sigma: compare.PoseSigma
-    """1-sigma of the poses by its own covariances; NaN without"""
+    """1-sigma of the poses by the covariances of the estimate; NaN without"""
     sigma_ratio: pd.DataFrame | None
-    """sigmas over those of the reference, by frame"""
+    """sigmas over those of the reference: see `compare.sigma_ratio`"""
     nis_per_degree: FloatArray
     """(T,) NaN where no innovation is recorded"""
     nis: compare.NisSummary
@@ -88,9 +88,9 @@ class InertialEvidence(Displayed):
 
     @property
     def series(self) -> pd.DataFrame:
-        """All of it by frame: `velocity_x`, `truth_velocity_x` (unaligned), `divergence_velocity_x`, `nees_state`, ...
+        """Table of all parts by frame: `velocity_x`, `truth_velocity_x` (unaligned), `divergence_velocity_x`, ...
 
-        The sigmas stand beside the values alone.
+        Only the columns of values have sigmas beside them, and `nees_state` is that of all 15 components.
         """
         parts = [self.values]
         for prefix, errors in (("truth", self.errors), ("divergence", self.divergence)):
@@ -114,7 +114,7 @@ class HeldOutReport(Displayed):
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Result(Displayed):
-    """Estimator of a run, compared."""
+    """Estimate of a run with its comparison to reference and truth."""
 
     estimate: Estimate
     reprojection: pd.DataFrame
@@ -145,12 +145,12 @@ class Result(Displayed):
 
     @property
     def nees(self) -> FloatArray | None:
-        """(T,) of the poses against truth; None without truth."""
+        """NEES (T,) of the poses against truth; None without truth."""
         return None if self.evidence.nees is None else self.evidence.nees["pose"].to_numpy()
 
     @property
     def divergence_rmse(self) -> float:
-        """Positions against the reference, m; NaN without one."""
+        """RMSE of the positions against the reference, m; NaN without a reference."""
         return float("nan") if self.divergence is None else compare.divergence_summary(self.divergence)["rmse"]
 
 
@@ -170,7 +170,7 @@ class Run(Displayed):
     held_out: HeldOutReport | None = None
     """None where no tracks were held out"""
     added: Mapping[str, str] = field(default_factory=dict)
-    """trajectories from files, and how each was paired and aligned: their names are among the results"""
+    """name -> pairing and alignment of each trajectory from a file; they are among the results"""
 
     @property
     def answered(self) -> list[Result]:
@@ -185,17 +185,17 @@ class Run(Displayed):
 
     @property
     def by_products(self) -> frozenset[str]:
-        """Estimators whose answers the reference's own run gives as well."""
+        """Estimators whose estimates are by-products of the reference's run."""
         return frozenset() if self.reference is None else frozenset(self.results[self.reference].estimate.by_products)
 
     @property
     def same_graph(self) -> frozenset[str]:
-        """Estimators that minimize the cost of the reference's graph as well."""
+        """Other estimators that minimize the cost of the reference."""
         return frozenset(SAME_GRAPH) - {self.reference} if self.reference in SAME_GRAPH else frozenset()
 
     @property
     def unranked(self) -> frozenset[str]:
-        """Estimators that are no competitors of the reference."""
+        """Estimators that are not ranked: by-products, the same graph, trajectories from files."""
         return self.by_products | self.same_graph | self.added.keys()
 
 
@@ -212,9 +212,10 @@ def compare_all(
     processes: int = 1,
     added: Mapping[str, str] | None = None,
 ) -> Run:
-    """All comparisons of a run, `held` being the tracks held out of it; so many `processes` share the work.
+    """Compares all estimates of a run with reference and truth, in `processes` processes.
 
-    `added` are estimates from files, with a caption each: they are aligned, so they are ranked with no other.
+    `held` are the tracks held out of the run. `added` are names and captions of estimates from files, which are
+    aligned to the reference and therefore not ranked.
     """
     added = added or {}
     reference = reference_among(estimates)
@@ -240,7 +241,7 @@ def compare_all(
 
 
 def _compared(problem: Problem, estimate: Estimate, reference: Estimate | None) -> dict[str, Any]:
-    """Fields of a `Result` but the estimate itself, which need not be sent from one process to another."""
+    """Fields of a `Result` except the estimate, which would cost time to send between processes."""
     sequence, truth = problem.sequence, problem.sequence.truth
     other = None if reference is None or reference.name == estimate.name else reference
     alignment = True if problem.imu is None else compare.Align.YAW
@@ -316,6 +317,6 @@ def common_rmse(tables: Mapping[str, pd.DataFrame]) -> dict[str, CommonRmse]:
 
 
 def same_frames(frames: Iterable[BoolArray]) -> bool:
-    """Whether all of them are the same (T,)."""
+    """Whether all masks (T,) are equal."""
     every = list(frames)
     return all(np.array_equal(every[0], other) for other in every[1:])

@@ -83,11 +83,12 @@ def state_nees(estimate: Estimate, truth: Truth) -> pd.DataFrame:
 def velocity_and_bias_errors(
     estimate: Estimate, other: Truth | Estimate, rotation: FloatArray | None = None
 ) -> pd.DataFrame:
-    """Errors of velocity and biases against truth or another estimate, one row per `frame`, with the columns
+    """Errors of velocity and biases against truth or another estimate, one row per `frame`.
 
-    Q, the norm, Q_x to Q_z, the estimated less the other value, and Q_sigma_x to Q_sigma_z, the estimate's 1-sigma, for
-    Q in `QUANTITIES`: `velocity` in m/s and world axes, `gyroscope_bias` in rad/s, `accelerometer_bias` in m/s^2, both
-    in the axes of the IMU. `rotation` (3, 3), other_R_estimate, aligns the worlds. NaN where either lacks a value.
+    For each Q of `QUANTITIES` there are the columns Q, the norm of the error; Q_x to Q_z, estimate minus other; and
+    Q_sigma_x to Q_sigma_z, 1-sigma of the estimate. `velocity` is in m/s and world axes, `gyroscope_bias` in rad/s and
+    `accelerometer_bias` in m/s^2 in IMU axes. `rotation` (3, 3), other_R_estimate, aligns the worlds. NaN where either
+    lacks a value.
     """
     table = velocity_and_biases(estimate, rotation)
     columns: dict[str, FloatArray] = {}
@@ -102,10 +103,11 @@ def velocity_and_bias_errors(
 
 
 def velocity_and_biases(estimate: Estimate, rotation: FloatArray | None = None) -> pd.DataFrame:
-    """Estimated velocity and biases, one row per `frame`, with the columns Q_x to Q_z and their 1-sigma Q_sigma_x to
+    """Estimated velocity and biases, one row per `frame`.
 
-    Q_sigma_z for Q in `QUANTITIES`, in the units and axes of `velocity_and_bias_errors`; NaN for what is unknown.
-    `rotation` (3, 3), other_R_estimate, gives velocities in another world.
+    For each Q of `QUANTITIES` there are the columns Q_x to Q_z and their 1-sigma, Q_sigma_x to Q_sigma_z, in the units
+    and axes of `velocity_and_bias_errors`; NaN where unknown. `rotation` (3, 3), other_R_estimate, rotates velocities
+    into another world.
     """
     T, P = len(estimate.world_T_imu), estimate.state_covariance
     columns: dict[str, FloatArray] = {}

@@ -19,13 +19,14 @@ MAD_TO_SIGMA = 1.4826
 
 
 def reprojection(sequence: Sequence, estimate: Estimate) -> pd.DataFrame:
-    """Residuals of every observation whose landmark and pose the estimate has, one row each, with the columns
+    """Reprojection residuals, a row for each observation whose landmark and pose the estimate has.
 
-    `observation` (its index in the sequence), `frame`, `landmark`, `uL vL uR vR` measured minus predicted in px,
-    `error` the Euclidean norm of these four (of uL and vL for one camera, whose uR and vR are NaN), `depth` in m along
-    the left camera's axis (the projection formula is also applied behind the camera), and `used`, whether the estimator
-    used it. Residuals of a landmark at infinity or
-    in the camera's plane are infinite, those of a landmark that is NaN are NaN.
+    Columns: `observation`, index in the sequence; `frame`; `landmark`; `uL vL uR vR`, measured minus predicted, px;
+    `error`, the Euclidean norm of these four, px (of uL and vL for one camera, whose uR and vR are NaN); `depth` along
+    the axis of the left camera, m; and `used`, whether the estimator used the observation.
+
+    The projection formula is also applied behind the camera. Residuals are infinite for a landmark at infinity or in
+    the camera's plane, and NaN for a landmark that is NaN.
     """
     o = sequence.observations
     position = np.full((sequence.n_landmarks, 3), np.nan)

@@ -20,10 +20,10 @@ REGION_ROWS, REGION_COLUMNS = ("top", "middle", "bottom"), ("left", "center", "r
 
 
 def residual_patterns(sequence: Sequence, table: pd.DataFrame) -> pd.DataFrame:
-    """Residuals of a reprojection table in classes, one row per non-empty class, with the columns
+    """Residuals of a reprojection table by classes, one row per non-empty class.
 
-    `by` (distance, track age, region, side), `of` (the class), `n`, `median`, `mean` and `p95` of the error in px, and
-    the median residuals `u` and `v` (over both cameras) in px, which are the bias of the class. `distance` is the depth
+    Columns: `by` (distance, track age, region, side); `of`, the class; `n`; `median`, `mean` and `p95` of the error,
+    px; and the bias of the class, the median residuals `u` and `v` over both cameras, px. `distance` is the depth
     in front of the left camera (no class behind it), `track age` counts the observations of the track so far, `region`
     is the ninth of the left image within the bounding box of the observations, and `side` compares the error of the
     left camera, the norm of uL and vL, with that of the right one.

@@ -22,11 +22,11 @@ def evaluated_rows(problem: Problem, table: pd.DataFrame) -> pd.DataFrame:
 
 
 def track_chi_square(problem: Problem, table: pd.DataFrame) -> pd.DataFrame:
-    """Chi-square test of each landmark of a reprojection table, one row each, with the columns
+    """Chi-square test of the residuals of each landmark of a reprojection table, one row per `landmark`.
 
-    `n` observations, `squared` the sum of their squared whitened residuals, `degrees` of freedom r n - 3 for r rows (r
-    n where landmarks have a prior), and the p-value `probability`. The degrees of freedom of the poses are neglected,
-    so the residuals of a good estimate are slightly small. Uniform p-values: white Gaussian noise of the assumed sigma.
+    Columns: `n` observations; `squared`, the sum of their squared whitened residuals; `degrees` of freedom, r n - 3 for
+    r rows (r n where landmarks have a prior); and `probability`, the p-value, which is uniform for white Gaussian noise
+    of the assumed sigma. The degrees of freedom of the poses are neglected, so residuals are slightly too small.
     """
     table = table[table["error"].notna()]
     squared = np.sum(whitened_rows(problem, table) ** 2, axis=1)

@@ -59,11 +59,11 @@ def pose_errors(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> "pd.
 
 
 def pose_error_columns(poses: FloatArray, reference: FloatArray, up: ArrayLike) -> Columns:
-    """Errors of poses (T, 4, 4) against reference poses (T, 4, 4), one row per `frame`, with the columns
+    """Errors of poses (T, 4, 4) against reference poses (T, 4, 4), a row for each frame.
 
-    `position` |p - p_ref|, m; its components `along` track, `across` track (left positive) and `up`, m, of the
-    reference's horizontal direction of travel; `rotation_deg` the angle of R_ref^T R and `heading_deg` its part about
-    `up` (left positive); `traveled` the length of the reference's path so far, m. NaN where either pose is.
+    Columns: `position`, |p - p_ref|, m; its components `along` and `across` the reference's horizontal direction of
+    travel (left positive) and `up`, m; `rotation_deg`, the angle of R_ref^T R; `heading_deg`, the part about `up` (left
+    positive); `traveled`, the length of the reference's path so far, m. NaN where either pose is.
     """
     if poses.shape != reference.shape:
         raise FgbaselineError(f"trajectories of {len(poses)} and {len(reference)} poses cannot be compared by frame")
@@ -104,10 +104,10 @@ def divergence_along_path(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.
 
 
 def divergence_columns(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.0, 1.0)) -> Columns:
-    """Columns of `pose_error_columns` of matched poses, with `t` (s) and `percent_of_path`
+    """Errors of matched poses as of `pose_error_columns`, with the stamp `t`, s, and `percent_of_path`.
 
-    = position error over distance traveled, %; NaN before the reference moves. The alignment is that of `matched`;
-    for growth from a common start use `none` or `first-pose`.
+    `percent_of_path` is the position error over the distance traveled, %; NaN before the reference moves. The alignment
+    is that of `matched`; for growth from a common start use `none` or `first-pose`.
     """
     columns = pose_error_columns(matched.estimate.world_T_body, matched.reference.world_T_body, up)
     moved = np.where(columns["traveled"] > 0, columns["traveled"], np.nan)

@@ -32,9 +32,9 @@ class Rate(NamedTuple):
     high: float
     unit: str
     over: str
-    """the interval"""
+    """interval of the stretches, with its unit"""
     n: int
-    """number of stretches"""
+    """number of stretches (pairs of poses)"""
 
 
 def drift(
@@ -64,12 +64,12 @@ def drift_rates(
 ) -> Mapping[str, Rate]:
     """Mean error of the motion over `meters` of the reference's path, per meter, and over `seconds`, per second.
 
-    By quantity: `value`, `low` and `high` of a block bootstrap, `unit`, the interval `over` and the number `n` of
-    overlapping stretches, each from a pose to the later one nearest to that interval.
-    Quantities: translation and rotation per meter (%, deg/m) and per second (m/s, deg/s; left out without
-    stamps), each divided by the stretch's own length; `end translation` (%) and `end rotation` (deg/m): the
-    error of the whole motion from first to last pose over the length of the path. Raises InputError where the reference
-    does not move or no stretch has the requested length.
+    Quantities are translation and rotation per meter (%, deg/m) and per second (m/s, deg/s; not without stamps), over
+    `n` overlapping stretches from each pose to the later one nearest to the interval `over`, each divided by its own
+    length; and `end translation` (%) and `end rotation` (deg/m), the error of the motion from first to last pose over
+    the length of the path. Each has its `value`, and the bounds `low` and `high` of a block bootstrap.
+
+    Raises InputError where the reference does not move or no stretch has the requested length.
     """
     reference = matched.reference
     traveled = distance_traveled(reference.position)

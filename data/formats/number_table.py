@@ -46,14 +46,14 @@ class NumberTable:
 
     @property
     def values(self) -> "FloatArray":
-        """(n, m)"""
+        """Numbers (n, m), a row per line."""
         import numpy as np
 
         return np.array(self.numbers).reshape(len(self.number), -1)
 
     @property
     def line(self) -> "IntArray":
-        """(n,) line numbers, from 1"""
+        """Line numbers (n,) in the file, from 1."""
         import numpy as np
 
         return np.array(self.number, dtype=np.int64)
@@ -199,7 +199,7 @@ def _floats(
 
 
 def require_width(lines: Lines, counts: dict[int, str]) -> None:
-    """Raises InputError unless the count of numbers in the first line is a key of `counts`, whose values name them."""
+    """Raises InputError where the first line has none of these counts of numbers; they come with what they mean."""
     lines.require_some()
     if lines.width not in counts:
         expected = " or ".join(f"{n} ({name})" for n, name in counts.items())

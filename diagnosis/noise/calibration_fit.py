@@ -17,20 +17,20 @@ from .correlated_noise import Inflation, inflation_of
 
 ROUNDS = 6
 START = NoiseSettings(pixel=1.0, linear_velocity=0.4, angular_velocity=0.02)
-"""px, baselines/s and rad/s"""
+"""px, baselines/s and rad/s: initial values of the noise"""
 FLOOR = NoiseSettings(pixel=0.02, linear_velocity=2e-4, angular_velocity=1e-5)
-"""px, baselines/s and rad/s: no noise is less"""
+"""px, baselines/s and rad/s: lower bounds of the noise"""
 EFFICIENCY = 0.37
 """efficiency of a variance from a median, relative to one from all residuals"""
 SIGNIFICANT = 4.0
 """standard errors, from which on an estimate is significant"""
 MIN_REDUNDANCY = 0.05
-"""redundancy of a velocity's residual, below which the fit follows the velocity and its residual shows no noise"""
+"""redundancy of a velocity residual below which the fit follows the velocity, and the residual is not used"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CalibrationFit:
-    """Noise and calibration parameters in common to all windows."""
+    """Noise and calibration parameters common to all windows."""
 
     sigmas: NoiseSettings
     """noise for a filter, correlated errors included"""
@@ -47,8 +47,8 @@ class CalibrationFit:
     white: NoiseSettings
     """white noise within a window: `sigmas` without time-correlated errors"""
     motion: FloatArray
-    """(n, 6) velocity residuals of all windows, each over the deviation that the sigmas and its redundancy give it: of
-    unit normal distribution where the noise is as found; NaN where the cameras determine nothing"""
+    """(n, 6) velocity residuals of all windows, normalized by sigma and redundancy: standard normal under the estimated
+    noise; NaN where tracks do not determine the velocity"""
 
 
 def fit_windows(
@@ -137,7 +137,7 @@ def _redundant_residuals(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]
 
 
 def _agreed(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]:
-    """The information-weighted mean (8,) of the calibration parameters, windows far off left out, and its deviation."""
+    """Information-weighted mean (8,) of the calibration parameters, without outliers, and standard errors (8,)."""
     information = np.array([fit.calibration_information for fit in fits])
     values = np.array([fit.calibration for fit in fits])
     center = np.median(values, axis=0)
@@ -145,9 +145,9 @@ def _agreed(fits: list[WindowFit]) -> tuple[FloatArray, FloatArray]:
     keep = (np.abs(values - center) < 5.0 * spread).all(axis=1) if len(fits) > 4 else np.ones(len(fits), dtype=bool)
     total = information[keep].sum(axis=0) + CALIBRATION_PRIOR
     mean = np.linalg.solve(total, np.einsum("wij,wj->i", information[keep], values[keep]))
-    claimed = np.sqrt(np.diag(np.linalg.inv(total)))
-    # The same mean's variance from how the windows differ: (sum I)^-1 sum I d d^T I (sum I)^-1
+    formal = np.sqrt(np.diag(np.linalg.inv(total)))
+    # Variance of the mean from the spread of the windows (sandwich): (sum I)^-1 sum I d d^T I (sum I)^-1
     difference = np.einsum("wij,wj->wi", information[keep], values[keep] - mean)
     inverse = np.linalg.inv(total)
-    seen = np.sqrt(np.diag(inverse @ (difference.T @ difference) @ inverse))
-    return mean, np.asarray(np.maximum(claimed, seen), dtype=np.float64)
+    spread_based = np.sqrt(np.diag(inverse @ (difference.T @ difference) @ inverse))
+    return mean, np.asarray(np.maximum(formal, spread_based), dtype=np.float64)

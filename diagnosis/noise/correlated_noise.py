@@ -1,9 +1,9 @@
 """Time-correlated noise: inflation factors of white noise, for pixels or for velocities.
 
 Pixel errors are correlated along a track, and some are common to all tracks, so that averaging over frames helps less
-than for white noise. A filter that assumes white noise is then overconfident in its cameras. Or the velocities drift.
-Windows of the recording give the excess of the difference between both over white noise; a disagreement between two
-halves of the tracks attributes it to the cameras.
+than for white noise, and a filter that assumes white noise is overconfident. Velocities may have correlated errors too.
+Over windows of the recording the motions by tracks and by velocities differ by more than white noise explains. Where
+the motions by two halves of the tracks differ as well, the excess is attributed to the pixels, else to velocities.
 """
 
 from dataclasses import dataclass, replace
@@ -19,12 +19,12 @@ from ..window_adjustment.bundle_adjustment import fit_each_window
 from ..window_adjustment.residuals import MISALIGNMENT, SCALE, Window, WindowData
 
 LOOSE = 30.0
-"""factor on the velocity noise for fits that the cameras dominate"""
+"""factor on the velocity noise, so that tracks dominate a fit"""
 MIN_LANDMARKS = 8
-"""landmarks of a fit that the cameras dominate"""
+"""smallest number of landmarks of a fit dominated by tracks"""
 MIN_WINDOWS = 3
 LASTING = 1.5
-"""factor between halves of the tracks from which on pixel errors count as time-correlated"""
+"""inflation `halves` above which pixel errors count as time-correlated"""
 MAX_FACTOR = 20.0
 ITERATIONS = 4
 

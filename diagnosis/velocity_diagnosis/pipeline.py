@@ -54,7 +54,7 @@ def known_units(sequence: Sequence, units: Mapping[str, float] | None = None) ->
 
 
 def _units(recorded: Sequence, usual: Sequence, seen: Odometry | None, given: Mapping[str, float] | None) -> Units:
-    """The units of all values, of the translation of imu_T_cam last: the others must be known for it."""
+    """Units of all values; that of the translation of imu_T_cam is last, as it needs the others."""
     doubt = doubt_of_intrinsics(recorded)
     units = Units(doubt=doubt) if doubt else units_of(recorded, seen, given)
     if units.doubt:
@@ -101,9 +101,9 @@ def _may_be_inverse(given: Diagnosis) -> bool:
 
 
 def _leads(inverse: Diagnosis, given: Diagnosis) -> bool:
-    """True if the inverse explains by one cause, and better, what needs several causes as recorded.
+    """Whether the inverse extrinsic explains the recording better than other axes of both velocities do.
 
-    Other axes of both velocities explain as much, except for the small angles of a calibration.
+    By their likelihoods alone the two explanations may be nearly equal; then the smaller misalignment decides.
     """
     if inverse.fit is None or inverse.angular.changed or inverse.linear.changed:
         return False

@@ -33,7 +33,7 @@ class Diagnosis(Displayed):
     linear: Axes = field(default_factory=lambda: Axes(IDENTITY, (False,) * 3, 0.0, np.nan, np.nan))
     timing: VelocityTimeOffset = field(default_factory=lambda: VelocityTimeOffset(0.0, np.inf, identifiable=False))
     shift: float = Shift.AFTER
-    """intervals, the shift that the calibrated problem uses"""
+    """intervals, time offset of the velocities that the calibrated problem uses"""
     fit: CalibrationFit | None = None
     repeated: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     """(T-1,) intervals whose tracks are copies"""
@@ -42,8 +42,8 @@ class Diagnosis(Displayed):
     units: Units = field(default_factory=Units)
     """factors by which the recorded values were multiplied"""
     recorded: Sequence | None = None
-    """the sequence as recorded; `sequence` is in SI units, has the extrinsic in the right direction and no outliers
-    among its velocities"""
+    """sequence as recorded; `sequence` has SI units, the extrinsic in the right direction, and velocities without
+    outliers"""
     outliers: VelocityOutliers | None = None
     """velocity samples that are replaced in `sequence`; None without any"""
     inversion: tuple[float, float] | None = None
@@ -56,12 +56,12 @@ class Diagnosis(Displayed):
 
     @property
     def gyro_bias(self) -> FloatArray:
-        """(3,) rad/s, gyroscope reading at rest, in recorded axes."""
+        """Gyroscope bias (3,), rad/s in recorded axes: the reading at rest."""
         return np.zeros(3) if self.fit is None else self.angular.matrix.T @ self.fit.calibration[:3]
 
     @property
     def gyro_bias_deviation(self) -> FloatArray:
-        """(3,) rad/s, standard errors of `gyro_bias`, in recorded axes."""
+        """Standard errors (3,) of `gyro_bias`, rad/s in recorded axes."""
         return np.full(3, np.inf) if self.fit is None else np.abs(self.angular.matrix.T) @ self.fit.deviation[:3]
 
     @property
@@ -73,7 +73,7 @@ class Diagnosis(Displayed):
 
     @property
     def misalignment(self) -> tuple[FloatArray, FloatArray]:
-        """(3,) rad, rotation vector of the error of imu_T_cam, in its own axes, and standard errors (3,)."""
+        """Rotation vector (3,) of the error of imu_T_cam, rad in IMU axes, and its standard errors (3,)."""
         if self.fit is None:
             return np.zeros(3), np.full(3, np.inf)
         return self.fit.calibration[MISALIGNMENT], self.fit.deviation[MISALIGNMENT]

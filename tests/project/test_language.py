@@ -79,3 +79,15 @@ def test_messages_and_docs_negate_the_verb() -> None:
         f"{path.relative_to(ROOT)}:{i}: {word.group()}" for path, i, text in texts for word in negated.finditer(text)
     ]
     assert not found
+
+
+def test_the_first_paragraph_of_a_docstring_is_a_sentence() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{node.body[0].lineno}"
+        for path in sources()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+        for text in [(ast.get_docstring(node) or "").split("\n\n")[0].strip()]
+        if text and "tests" not in path.parts and text[-1] not in ".:?"
+    ]
+    assert not found
