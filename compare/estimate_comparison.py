@@ -297,7 +297,7 @@ def _held_out_report(problem: Problem, estimates: Iterable[Estimate], held: Held
 
 
 def known(table: pd.DataFrame) -> BoolArray:
-    """(T,) frames for which a table of `compare.pose_errors` has a position."""
+    """Mask (T,) of the frames for which a table of `compare.pose_errors` has a position."""
     return np.asarray(table["position"].notna(), dtype=np.bool_)
 
 

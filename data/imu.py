@@ -36,7 +36,7 @@ class ImuNoise:
 
     @property
     def densities(self) -> FloatArray:
-        """(4,) the values in the order of the fields."""
+        """Densities and random walks (4,), in the order of the fields."""
         return np.array([getattr(self, field.name) for field in fields(self)])
 
     def __post_init__(self) -> None:

@@ -36,14 +36,14 @@ class TopView:
         return TopView(ahead, np.cross(up, ahead), up)
 
     def plane(self, points: FloatArray) -> FloatArray:
-        """(n, 2) m: points or directions (n, 3) of the world, seen from above."""
+        """Points or directions (n, 3) of the world as seen from above (n, 2), m."""
         return np.stack([points @ self.ahead, points @ self.left], axis=1)
 
     def height(self, points: FloatArray) -> FloatArray:
-        """(n,) m above the start."""
+        """Heights (n,) above the start, m."""
         return np.asarray(points @ self.up, dtype=np.float64)
 
     def scene(self, points: FloatArray) -> FloatArray:
-        """(n, 3) m: ahead of the start, to its left, and above it, of points (n, 3) of the world."""
+        """Coordinates (n, 3), m, ahead of, left of and above the start, of points (n, 3) of the world."""
         with np.errstate(invalid="ignore"):  # a landmark at infinity
             return np.column_stack([self.plane(points), self.height(points)])

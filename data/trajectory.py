@@ -90,12 +90,12 @@ class Trajectory(Displayed):
 
     @property
     def position(self) -> FloatArray:
-        """(T, 3) m in the world."""
+        """Positions (T, 3) in the world, m."""
         return self.world_T_body[:, :3, 3]
 
     @property
     def rotation(self) -> FloatArray:
-        """(T, 3, 3) `world_R_body`."""
+        """Rotations (T, 3, 3) `world_R_body`."""
         return self.world_T_body[:, :3, :3]
 
     def at(self, index: IntArray) -> "Trajectory":

@@ -71,7 +71,7 @@ class IndependentLandmarks:
         self.root_information[row] = R[:, :3, :3]
 
     def _squared_norms(self, residual: FloatArray, H: FloatArray, row: IntArray) -> FloatArray:
-        """(n,) r^T (H Sigma H^T + V)^-1 r of residuals (n, 3) with Jacobians (n, 3, 3) of known landmarks."""
+        """NIS (n,), r^T (H Sigma H^T + V)^-1 r, of residuals (n, 3) with Jacobians (n, 3, 3) of known landmarks."""
         half = np.linalg.solve(np.swapaxes(self.root_information[row], 1, 2), np.swapaxes(H, 1, 2))
         S = np.swapaxes(half, 1, 2) @ half + np.diag(self.measurement.row_variance)
         return mahalanobis_squared(residual, S)

@@ -58,7 +58,7 @@ class Alignment(Displayed):
 
     @property
     def matrix(self) -> FloatArray:
-        """(4, 4) `reference_T_estimate`; its upper left block is scale * rotation."""
+        """Transformation (4, 4) `reference_T_estimate`; its upper left block is scale * rotation."""
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = self.scale * self.rotation, self.translation
         return T

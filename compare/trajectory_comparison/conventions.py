@@ -45,7 +45,7 @@ class Resolved:
 
     @property
     def covariance(self) -> FloatArray | None:
-        """(n, 6, 6) of the right perturbation of each pose, where the file has them."""
+        """Covariances (n, 6, 6) of the right perturbation of each pose; None if the file has none."""
         return self.source.covariance(self.order) if isinstance(self.source, ParsedTrajectory) else None
 
     @property

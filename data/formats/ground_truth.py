@@ -122,7 +122,7 @@ def _poses_of_frames(
 
 
 def _lines(file: ParsedTrajectory, n_frames: int, frames: IntArray, index: IntArray) -> IntArray:
-    """(T,) the line of the file that each frame's pose stands on; -1 where there is none."""
+    """Lines (T,) of the file that the poses of the frames are on; -1 for a frame without a pose."""
     line = np.full(n_frames, -1, dtype=np.int64)
     if file.line is not None:
         line[frames] = file.line[index]
@@ -152,7 +152,7 @@ def _order(
 
 
 def _turned(sequence: Sequence) -> FloatArray:
-    """(T, 3, 3) rotations of the frames since frame 0, by the gyroscope."""
+    """Rotations (T, 3, 3) of the frames since frame 0, integrated from the gyroscope."""
     if sequence.imu is None:
         increments = so3.exp_so3(sequence.angular_velocity[:-1] * sequence.dt[:, None])
     else:

@@ -6,7 +6,7 @@ from fgbaseline.geometry import FloatArray
 
 
 def pose_covariances(numbers: FloatArray, world_R_body: FloatArray) -> FloatArray:
-    """(n, 6, 6) of the right perturbation [v, w], m and rad, of poses with rotations (n, 3, 3).
+    """Covariances (n, 6, 6) of the right perturbation [v, w], m and rad, of poses with rotations (n, 3, 3).
 
     `numbers` are such matrices already, or (n, 36) as in ROS: row by row, position and rotation, both along the axes
     of the world; or (n, 12) as OpenVINS writes them: the upper triangles of the rotation's (in the body) and of the
@@ -27,7 +27,7 @@ def pose_covariances(numbers: FloatArray, world_R_body: FloatArray) -> FloatArra
 
 
 def _symmetric(upper: FloatArray) -> FloatArray:
-    """(n, 3, 3) of the upper triangles (n, 6), row by row."""
+    """Symmetric matrices (n, 3, 3) with the upper triangles (n, 6), row by row."""
     matrix = np.empty((len(upper), 3, 3))
     for k, (i, j) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
         matrix[:, i, j] = matrix[:, j, i] = upper[:, k]

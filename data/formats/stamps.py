@@ -44,7 +44,7 @@ class Stamps:
         return Stamps(self.value[index], whole, self.unit, [self.words[i] for i in index.tolist()])
 
     def seconds(self, unit: TimeUnit) -> FloatArray:
-        """(n,) s; whole numbers are divided exactly, as doubles cannot hold nanoseconds since 1970."""
+        """Stamps (n,), s; integers are divided exactly, as doubles cannot hold nanoseconds since 1970."""
         per_second = unit.per_second
         if per_second == 1:
             return self.value.copy()
@@ -60,13 +60,13 @@ class Stamps:
         return float(np.median(steps)) if len(steps) else None
 
     def rising(self) -> BoolArray:
-        """(n - 1,) whether each stamp is after the one before."""
+        """Mask (n - 1,): whether each stamp is after the previous one."""
         if self.whole is None:
             return np.asarray(np.diff(self.value) > 0)
         return np.array([b > a for a, b in zip(self.whole[:-1], self.whole[1:], strict=True)], dtype=np.bool_)
 
     def equal(self) -> BoolArray:
-        """(n - 1,) whether each stamp is that of the one before."""
+        """Mask (n - 1,): whether each stamp is equal to the previous one."""
         if self.whole is None:
             return np.asarray(np.diff(self.value) == 0)
         return np.array([b == a for a, b in zip(self.whole[:-1], self.whole[1:], strict=True)], dtype=np.bool_)

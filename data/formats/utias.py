@@ -70,7 +70,7 @@ def _observations(mat: MatFile, T: int) -> tuple[Observations, int, tuple[Findin
 
 
 def _first_columns(mat: MatFile, key: str, T: int) -> FloatArray:
-    """(3, T) of a variable (3, >= T)."""
+    """First T columns (3, T) of a variable (3, >= T)."""
     array = mat.array(key)
     if array.ndim != 2 or array.shape[0] != 3 or array.shape[1] < T:
         raise InputError(f"{key}: expected 3 rows of at least {T} columns for the {T} time stamps, got {array.shape}")

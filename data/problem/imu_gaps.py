@@ -18,13 +18,13 @@ PERIODS = 2.5
 
 
 def sample_gaps(samples: ImuSamples) -> IntArray:
-    """(g,) indices of the samples after which no other follows for more than `GAP`."""
+    """Indices (g,) of the samples that are followed by a gap."""
     longest = max(GAP, PERIODS * samples.period)
     return np.flatnonzero(np.diff(samples.t) > longest)
 
 
 def interval_densities(samples: ImuSamples, frames: FloatArray) -> FloatArray:
-    """(T-1, 4) noise densities and walks of each interval between frames (T,), s: larger where a gap lies in it."""
+    """Noise densities and walks (T-1, 4) of each interval between frames (T,), s: larger if a gap lies in it."""
     densities = np.tile(samples.noise.densities, (len(frames) - 1, 1))
     for i in sample_gaps(samples).tolist():
         start, end = float(samples.t[i]), float(samples.t[i + 1])
@@ -36,7 +36,7 @@ def interval_densities(samples: ImuSamples, frames: FloatArray) -> FloatArray:
 
 
 def _change(samples: ImuSamples, lag: float) -> FloatArray:
-    """(2,) q of angular velocity and specific force, the largest of their components."""
+    """Spectral densities q (2,) of angular velocity and specific force, each the largest of its components."""
     steps = max(1, min(round(lag / samples.period), len(samples) - 1))
     straight = samples.t[steps:] - samples.t[:-steps] < 1.5 * steps * samples.period
     if not straight.any():

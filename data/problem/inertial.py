@@ -35,7 +35,7 @@ class InertialStart(Displayed):
 
     @property
     def bias(self) -> FloatArray:
-        """(6,) rad/s and m/s^2, gyroscope first."""
+        """Biases (6,) of gyroscope, rad/s, and accelerometer, m/s^2."""
         return np.concatenate([self.gyroscope_bias, self.accelerometer_bias])
 
     @property
@@ -89,7 +89,7 @@ class ImuIntervals(Displayed):
 
     @property
     def gravity_vector(self) -> FloatArray:
-        """(3,) m/s^2 in the world, whose z axis points up."""
+        """Gravity (3,), m/s^2, in the world, whose z axis points up."""
         return np.array([0.0, 0.0, -self.gravity])
 
 

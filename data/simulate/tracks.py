@@ -113,12 +113,12 @@ def follow(
 
 
 def _lifetimes(n: int, how: Tracking, rng: np.random.Generator) -> IntArray:
-    """(n,) for how many frames a tracker holds a point that stays in view."""
+    """Numbers (n,) of frames for which a tracker holds a point that stays in view."""
     return np.maximum(rng.lognormal(np.log(how.length), _SPREAD, n), SHORTEST).astype(np.int64)
 
 
 def _wanted(features: float, seeing: BoolArray, t: FloatArray, rng: np.random.Generator) -> IntArray:
-    """(T,) how many points the detector wants: varies by a quarter over some seconds, as texture does."""
+    """Numbers (T,) of points that the detector asks for: they vary by a quarter over seconds, as texture does."""
     n = len(t)
     place = (t - t[0]) / 4.0
     around = [np.floor(place), np.floor(place) + 1.0, np.ceil(place[-1:]) + 1.0]
@@ -139,7 +139,7 @@ def _born(source: Source, sight: CameraView, how: Tracking, wanted: IntArray, rn
 
 
 def _held(candidates: _Candidates, begin: IntArray, life: IntArray, sight: CameraView, t: FloatArray) -> IntArray:
-    """(c,) for how many frames from `begin` (c,) on, at most `life` (c,), each candidate is seen without a break."""
+    """Numbers (c,) of consecutive frames from `begin` (c,) on, at most `life` (c,), that observe each candidate."""
     length = np.clip(np.minimum(life, len(t) - begin), 0, None)
     for start in range(0, len(length), _CHUNK):
         part = slice(start, min(start + _CHUNK, len(length)))
@@ -159,7 +159,7 @@ def _expand(begin: IntArray, length: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _top_up(birth: IntArray, length: IntArray, wanted: IntArray) -> BoolArray:
-    """(c,) which candidates are taken: at every frame as many as are missing, in the order they are offered."""
+    """Mask (c,) of the candidates that are taken: at every frame as many as are missing, in their order."""
     chosen = np.zeros(len(birth), dtype=np.bool_)
     starts = np.searchsorted(birth, np.arange(len(wanted) + 1))
     ends = np.zeros(len(wanted) + int(length.max(initial=0)) + 1, dtype=np.int64)

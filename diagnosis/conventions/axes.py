@@ -48,7 +48,7 @@ class Axes:
 
     @property
     def matrix(self) -> FloatArray:
-        """(3, 3) rotation of recorded components to the axes of imu_T_cam."""
+        """Rotation (3, 3) from the recorded axes to the axes of imu_T_cam."""
         return axes_matrix(self.name)
 
     @property

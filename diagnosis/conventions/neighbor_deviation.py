@@ -23,6 +23,6 @@ def among_neighbors(recorded: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def far(difference: FloatArray, recorded: FloatArray) -> FloatArray:
-    """(n,) differences of velocities (n, 3), NaN where unknown, in median differences."""
+    """Distances (n,) between velocities, over their median or a share of `recorded` (n, 3); NaN where unknown."""
     usual = float(np.quantile(np.linalg.norm(recorded, axis=1), 0.9))
     return np.asarray(difference / max(float(np.nanmedian(difference)), FLOOR * usual, TINY), dtype=np.float64)

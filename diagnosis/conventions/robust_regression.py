@@ -51,7 +51,7 @@ def regress(y: FloatArray, X: FloatArray, prior: FloatArray) -> Regression:
 
 
 def _bulk(residual: FloatArray) -> FloatArray:
-    """(d,) 1.4826 times the median size of residuals (d, n): the deviation of a Gaussian bulk."""
+    """Sigmas (d,) of the bulk of residuals (d, n): MAD_TO_SIGMA times their median absolute value."""
     half = residual.shape[1] // 2
     # np.median's value; it takes several times as long, and this is half of what a regression does.
     sorted_about = np.partition(np.abs(residual), half, axis=1)

@@ -78,7 +78,7 @@ def timing(seen: FloatArray, recorded: FloatArray, known: BoolArray, dt: float) 
 
 
 def _surrounded(known: BoolArray) -> BoolArray:
-    """(n,) intervals that have no long gap, and no end, within reach of any shift."""
+    """Mask (n,) of the intervals that have neither a long gap nor an end within the largest shift."""
     margin = int(np.ceil(MAX_SHIFT)) + 1
     edges = np.flatnonzero(np.diff(np.concatenate([[True], known, [True]]).astype(np.int8)))
     good = np.ones(len(known), dtype=np.bool_)

@@ -59,17 +59,17 @@ class TrackStatistics:
 
     @property
     def wrong_share(self) -> FloatArray:
-        """(T-1,) share of the matches that contradict the motion; NaN where it is unknown."""
+        """Shares (T-1,) of matches that contradict the motion of their interval; NaN where it is unknown."""
         return np.where(self.matches > 0, self.wrong / np.maximum(self.matches, 1), np.nan)
 
     @property
     def burst(self) -> BoolArray:
-        """(T-1,) intervals in which a third or more of the matches contradict the motion."""
+        """Mask (T-1,) of the intervals in which a third or more of the matches contradict the motion."""
         return _burst(self.wrong, self.matches)
 
     @property
     def few(self) -> BoolArray:
-        """(T,) frames with fewer than `MIN_USABLE` usable features."""
+        """Mask (T,) of the frames with fewer than `MIN_USABLE` usable features."""
         return np.asarray(self.usable < MIN_USABLE, dtype=np.bool_)
 
 
@@ -136,7 +136,7 @@ def _moving(landmark: IntArray, frame: IntArray, outlier: BoolArray) -> int:
 
 
 def _left(sequence: Sequence, repaired: Repaired, before: IntArray, after: IntArray) -> BoolArray:
-    """(n,) matches of the recording whose two observations are still one track's once it is repaired and masked."""
+    """Mask (n,) of the matches whose two observations are in one track of the repaired and masked recording."""
     o, now = sequence.observations, repaired.sequence.observations
     # The repair gives observations other landmarks, and with them another order within their frame.
     was, is_now = (np.lexsort((*x.pixel.T, x.frame)) for x in (o, now))

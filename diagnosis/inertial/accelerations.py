@@ -32,7 +32,7 @@ class AccelerationChanges(NamedTuple):
     """(n, 3, 3, 3) of the product of attitude [i, j] and recorded specific force [l], at [n, i, j, l]"""
 
     def of_force(self, matrix: FloatArray) -> FloatArray:
-        """(n, 3) changes of the force where `matrix` (3, 3) takes recorded components to the axes of imu_T_cam."""
+        """Changes (n, 3) of the specific force if `matrix` (3, 3) rotates recorded axes to those of imu_T_cam."""
         return np.asarray(np.einsum("nijl,jl->ni", self.by_samples, matrix))
 
     def correlation(self, matrix: FloatArray) -> float:

@@ -40,7 +40,7 @@ class SensorAxes:
 
     @property
     def accelerometer_matrix(self) -> FloatArray:
-        """(3, 3) that takes recorded specific forces to the axes of imu_T_cam."""
+        """Matrix (3, 3) from recorded specific forces to the axes of imu_T_cam, the sign included."""
         return self.sign * axes_matrix(self.accelerometer)
 
     @property

@@ -98,7 +98,7 @@ def _nothing(n: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _rates_at_frames(sequence: Sequence) -> FloatArray:
-    """(T, 3) angular velocity at the frames."""
+    """Angular velocities (T, 3) at the frames, rad/s."""
     imu = sequence.imu
     assert imu is not None
     return np.stack([np.interp(sequence.t, imu.t, column) for column in imu.angular_velocity.T], axis=1)

@@ -45,7 +45,7 @@ def rest_noise(sequence: Sequence, duration: float) -> RestNoise | None:
 
 
 def allan_deviation(values: FloatArray, steps: int) -> FloatArray:
-    """(c,) overlapping Allan deviation of samples (n, c) at an averaging of `steps` samples (Allan 1966)."""
+    """Overlapping Allan deviations (c,) of samples (n, c), averaged over `steps` samples (Allan, 1966)."""
     total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
     mean = (total[steps:] - total[:-steps]) / steps
     difference = mean[steps:] - mean[:-steps]

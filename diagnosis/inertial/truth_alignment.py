@@ -56,7 +56,7 @@ def path_from(pose: FloatArray, path: FloatArray) -> FloatArray:
 
 
 def _up(truth: Truth, path: FloatArray, known: np.ndarray) -> tuple[FloatArray, str]:
-    """(3,) the direction opposite to gravity in the truth's world, and its source."""
+    """Up direction (3,) in the world of the truth, and its source."""
     if truth.up is not None:
         return truth.up, "the up that is stated"
     measured = np.einsum("nij,nj->ni", truth.world_T_imu[known, :3, :3], path[known, 2, :3]).mean(axis=0)
@@ -70,6 +70,6 @@ def _up(truth: Truth, path: FloatArray, known: np.ndarray) -> tuple[FloatArray, 
 
 
 def _yaw(path: FloatArray, truth: FloatArray) -> FloatArray:
-    """(3, 3) the rotation about z that takes rotations of the truth (n, 3, 3) nearest to those of the path."""
+    """Rotation (3, 3) about z that takes rotations (n, 3, 3) of the truth nearest to those of the path."""
     z = np.array([0.0, 0.0, 1.0])
     return so3.exp_so3(so3.twist_angle(z, (path @ np.swapaxes(truth, 1, 2)).sum(axis=0)) * z)

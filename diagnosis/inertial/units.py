@@ -40,12 +40,12 @@ class ImuUnits:
 
 
 def mean_rates(sequence: Sequence) -> FloatArray:
-    """(T-1, 3) mean angular velocity of the samples between frames, in their unit."""
+    """Mean angular velocities (T-1, 3) of the samples between frames, in their unit."""
     return _means(sequence)[0]
 
 
 def mean_forces(sequence: Sequence) -> FloatArray:
-    """(T-1, 3) mean specific force of the samples between frames, in their unit."""
+    """Mean specific forces (T-1, 3) of the samples between frames, in their unit."""
     return _means(sequence)[1]
 
 

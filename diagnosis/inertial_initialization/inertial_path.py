@@ -34,7 +34,7 @@ class InertialPath:
     """(m,) squared whitened residuals of the m known intervals of the odometry"""
 
     def twist(self, sequence: Sequence) -> FloatArray:
-        """(T-1, 6) mean body velocity [v, w] of each interval, m/s and rad/s."""
+        """Mean body velocities [v, w] (T-1, 6) of the intervals, m/s and rad/s."""
         return np.asarray(se3.log(se3.relative(self.states.pose)) / sequence.dt[:, None], dtype=np.float64)
 
 

@@ -72,7 +72,7 @@ def _factorized(H: Any) -> Any:
 
 
 def _first_covariance(H: Any, free: Any) -> FloatArray:
-    """(15, 15) the marginal of the first keyframe."""
+    """Marginal covariance (15, 15) of the first keyframe."""
     B = free[[*range(STATE)], :].toarray()
     covariance = B @ _factorized(H).solve(np.ascontiguousarray(B.T))
     return np.asarray(0.5 * (covariance + covariance.T), dtype=np.float64)
@@ -144,7 +144,7 @@ def _added(
 
 
 def _free_errors(pose: FloatArray) -> FloatArray:
-    """(15, 11) the errors that the first keyframe may have: a tilt, velocity and biases."""
+    """Basis (15, 11) of the errors that the first keyframe may have: tilt, velocity and biases."""
     up = pose[2, :3]
     tilt = np.linalg.svd(up[None])[2][1:].T
     basis = np.zeros((STATE, 11))

@@ -49,7 +49,7 @@ def aligned(imu: ImuIntervals, frames: IntArray, seen: RelativePoses) -> States:
 
 
 def gyroscope_bias(imu: ImuIntervals, frames: IntArray, rotation: FloatArray, known: BoolArray) -> FloatArray:
-    """(3,) rad/s, at which the gyroscope turns as the cameras see: rotations (n-1, 3, 3) of the `known` intervals."""
+    """Gyroscope bias (3,), rad/s, that fits the visual rotations (n-1, 3, 3) of the `known` intervals."""
     bias, none = np.zeros(3), np.zeros(3)
     integrated = motions_between(imu, frames, np.zeros((len(frames) - 1, 6)))
     for _ in range(BIAS_ROUNDS):

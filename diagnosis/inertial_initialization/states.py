@@ -27,7 +27,7 @@ class States:
 
     @property
     def biases(self) -> FloatArray:
-        """(n, 6) of gyroscope and accelerometer."""
+        """Biases (n, 6) of gyroscope, rad/s, and accelerometer, m/s^2."""
         return np.concatenate([self.gyroscope_bias, self.accelerometer_bias], axis=1)
 
     def stepped(self, delta: FloatArray) -> "States":

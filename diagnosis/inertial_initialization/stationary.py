@@ -19,7 +19,7 @@ KEYFRAMES = 20
 
 
 def standing_frames(sequence: Sequence, longest: float = LONGEST) -> IntArray:
-    """(k,) the frames from 0 on in which the camera stands as in frame 0, at most `longest` s; frame 0 alone if none.
+    """Frames (k,) from 0 on in which the camera stands still, at most `longest` s; frame 0 alone if it moves.
 
     Frames whose tracks are too few are bridged.
     """
@@ -46,6 +46,6 @@ def stands(sequence: Sequence, frames: IntArray) -> bool:
 
 
 def keyframes_of(frames: IntArray) -> IntArray:
-    """(n,) at most `KEYFRAMES` of the frames, spread evenly."""
+    """Keyframes (n,): at most `KEYFRAMES` of the frames, evenly spaced."""
     chosen = np.unique(np.linspace(0, len(frames) - 1, min(KEYFRAMES, len(frames))).round().astype(np.int64))
     return np.asarray(frames[chosen], dtype=np.int64)

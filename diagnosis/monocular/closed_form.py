@@ -85,7 +85,7 @@ def _linear_positions(motions: Motions) -> tuple[FloatArray, FloatArray, FloatAr
 
 
 def _scatter(rays: Rays, across: FloatArray, scale: FloatArray) -> FloatArray:
-    """(m, 3, 3) information of the points."""
+    """Information matrices (m, 3, 3) of the points."""
     A = np.zeros((int(rays.point.max()) + 1, 3, 3))
     np.add.at(A, rays.point, scale[:, None, None] * across)
     return A

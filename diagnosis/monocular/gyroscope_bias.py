@@ -33,7 +33,7 @@ Pair = tuple[int, int, FloatArray, FloatArray]
 
 
 def epipolar_bias(rays: Rays, integrated: Motions) -> FloatArray:
-    """(3,) rad/s; `integrated` are the motions between keyframes at biases of zero. Raises ValueError without pairs."""
+    """Gyroscope bias (3,), rad/s, from motions `integrated` with zero bias. Raises ValueError without pairs."""
     pairs = _pairs(rays, len(integrated.dt) + 1)
     if not pairs:
         raise ValueError(f"no two keyframes share {MIN_COMMON} tracks")

@@ -46,7 +46,7 @@ class EpipolarConsistency:
         """px"""
 
     def agree(self, before: IntArray, after: IntArray) -> BoolArray:
-        """(n,) whether both are of one track, and nothing is known that contradicts."""
+        """Mask (n,): whether both are of one track and no known motion contradicts."""
         o = self._observations
         apart, agree = o.frame[after] - o.frame[before], o.landmark[after] == o.landmark[before]
         for step, error in self.error.items():

@@ -67,7 +67,7 @@ class EpipolarMotions:
     """rad, of a ray, from the median of the residuals"""
 
     def directed(self, least: float) -> BoolArray:
-        """(p,) whether the direction is known to `DIRECTED`, with rays of `least` rad or more."""
+        """Mask (p,): whether the direction has a sigma below `DIRECTED`, for a ray sigma of at least `least`, rad."""
         variance = np.trace(self.covariance[:, 3:, 3:], axis1=1, axis2=2) * max(1.0, least / self.sigma) ** 2
         return np.asarray(np.nan_to_num(variance, nan=np.inf) < DIRECTED**2, dtype=np.bool_)
 
@@ -99,7 +99,7 @@ def epipolar_motions(matches: RayMatches, n_pairs: int) -> EpipolarMotions:
 
 
 def beyond_scene(matches: RayMatches, motion: Motion) -> FloatArray:
-    """(n,) rad by which a track moves along its epipolar line otherwise than a point of the scene does.
+    """Angles (n,), rad, by which matches lie outside the part of their epipolar line that points of the scene reach.
 
     A point lies no farther than infinity, and no nearer than the nearest tenth of its pair's points by a factor of
     `NEARER`.
@@ -171,7 +171,7 @@ def _better(matches: RayMatches, best: Motion, other: Motion) -> Motion:
 
 
 def _residuals(matches: RayMatches, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """(n,) residuals in rad, and (n,) their divisors."""
+    """Residuals (n,), rad, and their divisors (n,)."""
     moved, t = _turned(matches, motion.rotation), motion.direction[matches.pair]
     plane = np.cross(t, moved)
     scale = np.sqrt((plane**2).sum(axis=1) + (np.cross(t, matches.first) ** 2).sum(axis=1))
@@ -200,12 +200,12 @@ def _normal_equations(
 
 
 def _turned(matches: RayMatches, rotation: FloatArray) -> FloatArray:
-    """(n, 3) rays of the second view in the axes of the first."""
+    """Rays (n, 3) of the second view in the axes of the first."""
     return np.asarray((rotation[matches.pair] @ matches.second[:, :, None])[:, :, 0])
 
 
 def _basis(direction: FloatArray) -> FloatArray:
-    """(p, 3, 2) unit vectors across the directions (p, 3)."""
+    """Pairs of unit vectors (p, 3, 2) orthogonal to the directions (p, 3)."""
     least = np.eye(3)[np.argmin(np.abs(direction), axis=1)]
     first = np.cross(direction, least)
     first /= np.linalg.norm(first, axis=1, keepdims=True)

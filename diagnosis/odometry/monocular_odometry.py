@@ -46,7 +46,7 @@ def track_pairs(sequence: Sequence, step: int) -> tuple[IntArray, IntArray]:
 
 
 def rays(sequence: Sequence) -> FloatArray:
-    """(n, 3) unit rays of the observations in the axes of the IMU."""
+    """Unit rays (n, 3) of the observations in the axes of the IMU."""
     camera, pixel = sequence.camera, sequence.observations.pixel
     ray = np.ones((len(pixel), 3))
     ray[:, :2] = (pixel[:, :2] - [camera.cu, camera.cv]) / [camera.fu, camera.fv]

@@ -20,7 +20,7 @@ SEED = 20260
 def best_hypotheses(
     camera: StereoCamera, segments: TrackSegments, n_pairs: int, count: IntArray, known: BoolArray
 ) -> FloatArray:
-    """(n_pairs, 4, 4) the motion of least truncated cost among three-point hypotheses and the identity.
+    """Motions (n_pairs, 4, 4) with the smallest truncated cost among three-point hypotheses and the identity.
 
     `segments` are the segments of the `known` pairs, sorted by pair, `count` (n_pairs,) their number in each pair.
     """
@@ -47,12 +47,12 @@ def best_hypotheses(
 
 
 def _columns(M: FloatArray) -> FloatArray:
-    """(3, 4, 1, p) of motions (p, 4, 4)."""
+    """Motions (p, 4, 4) with coordinates as the first axes (3, 4, 1, p)."""
     return np.moveaxis(M[:, :3], 0, 2)[:, :, None]
 
 
 def _three_of(rng: np.random.Generator, count: IntArray) -> IntArray:
-    """(p, 3) three different indices below each count (p,)."""
+    """Samples (p, 3) of three different indices below each count (p,)."""
     first = rng.integers(0, count)
     second = rng.integers(0, count - 1)
     second += second >= first
@@ -89,7 +89,7 @@ def _through_three(points: FloatArray, moved: FloatArray) -> FloatArray:
 
 
 def _axes_of_plane(points: FloatArray) -> FloatArray:
-    """(3, 3, p) two unit vectors in the plane of three points (3, 3, p), and its normal."""
+    """Axes (3, 3, p): two unit vectors in the plane of three points (3, 3, p), and its normal."""
     first, second = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
     normal = np.cross(first, second, axis=0)
     normal /= np.sqrt((normal**2).sum(axis=0))
@@ -98,8 +98,10 @@ def _axes_of_plane(points: FloatArray) -> FloatArray:
 
 
 def _truncated_costs(camera: StereoCamera, segments: TrackSegments, count: IntArray, motions: FloatArray) -> FloatArray:
-    """(h, p) sum of the squared pixel residuals of each pair's segments under h motions (3, 4, h, p) of it, each
-    truncated; no whitening, for speed. The pairs have `count` (p,) segments each."""
+    """Costs (h, p) of h motions (3, 4, h, p) of each pair: its truncated squared pixel residuals, summed.
+
+    Residuals are not whitened, for speed. The pairs have `count` (p,) segments each.
+    """
     h, p = motions.shape[2:]
     P = np.ascontiguousarray((camera.K @ motions.reshape(3, -1)).reshape(3, 4, h, p).transpose(3, 0, 2, 1))
     point = np.concatenate([segments.point.T, np.ones((1, len(segments)))])
@@ -119,7 +121,7 @@ def _truncated_costs(camera: StereoCamera, segments: TrackSegments, count: IntAr
 
 
 def _truncated(camera: StereoCamera, moved: FloatArray, pixel: FloatArray) -> FloatArray:
-    """(h, n) squared residuals of segments whose points project to moved[:2] / moved[2] (3, h, n) in the left image."""
+    """Truncated squared residuals (h, n) of segments whose points project to moved[:2] / moved[2] (3, h, n)."""
     u, v, depth = moved
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         near = 1.0 / depth

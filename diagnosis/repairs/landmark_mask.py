@@ -54,8 +54,10 @@ def _moving(model: MeasurementModel, world_T_cam: FloatArray, row: IntArray, o: 
 
 
 def _pieces(row: IntArray, frame: IntArray) -> tuple[IntArray, int]:
-    """(n,) the piece of each observation of landmarks `row` (n,): `PIECE` to twice as many in a row, fewer in short
-    tracks; and how many pieces there are."""
+    """Piece (n,) of each observation of landmarks `row` (n,), and the number of pieces.
+
+    A piece has `PIECE` to twice as many consecutive observations, or those of a short track.
+    """
     order = np.lexsort((frame, row))
     length = np.bincount(row)
     start = np.cumsum(length) - length

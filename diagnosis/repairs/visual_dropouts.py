@@ -36,7 +36,7 @@ class DropoutVelocities:
 
 
 def dropout_intervals(observations: Observations, n_frames: int) -> BoolArray:
-    """(T-1,) intervals whose two frames have too few common landmarks for odometry."""
+    """Mask (T-1,) of the intervals whose two frames have too few common landmarks for odometry."""
     order = observations.by_track()
     frame, landmark = observations.frame[order], observations.landmark[order]
     linked = (landmark[:-1] == landmark[1:]) & (frame[:-1] + 1 == frame[1:])

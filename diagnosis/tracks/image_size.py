@@ -66,5 +66,5 @@ def _mismatch(sequence: Sequence) -> str:
 
 
 def _span(sequence: Sequence) -> FloatArray:
-    """(2, 2) px: uL and vL from which on, and up to which nearly all observations lie."""
+    """Bounds (2, 2) of uL and vL, px, between which nearly all observations lie."""
     return np.quantile(sequence.observations.pixel[:, :2], OUTER, axis=0)

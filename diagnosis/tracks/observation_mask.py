@@ -37,7 +37,7 @@ class ConsistencyTest(Protocol):
     """Test whether two observations of a track agree on one static point."""
 
     def agree(self, before: IntArray, after: IntArray) -> BoolArray:
-        """(n,) whether observations `before` and `after` (n,), sorted by track, are of one track and agree."""
+        """Mask (n,): whether observations `before` and `after` (n,), sorted by track, are of one track and agree."""
 
 
 def exclusions(sequence: Sequence, world_T_imu: FloatArray, settings: MaskSettings) -> NDArray[np.uint8]:
@@ -142,7 +142,7 @@ class TrackConsistency:
         self.gate = gate
 
     def error(self, before: IntArray, after: IntArray) -> FloatArray:
-        """(n,) px: |(uL, uR, v)| of observations `after` (n,) against their prediction from `before` (n,).
+        """Distances (n,) in (uL, uR, v), px, of observations `after` (n,) from their prediction by `before` (n,).
 
         Infinite where the predicted point is not in front of the camera.
         """
@@ -154,7 +154,7 @@ class TrackConsistency:
         return np.where(predicted[:, 2] > 0, error, np.inf)
 
     def agree(self, before: IntArray, after: IntArray) -> BoolArray:
-        """(n,) whether both are of one track and within the gate."""
+        """Mask (n,): whether both are of one track and within the gate."""
         landmark = self.sequence.observations.landmark
         same = landmark[before] == landmark[after]
         agree = np.zeros(len(before), dtype=np.bool_)
@@ -179,7 +179,7 @@ def _without_lone_outliers(test: ConsistencyTest, landmark: IntArray, order: Int
 
 
 def _longest_run_of_each_track(landmark: IntArray, run: IntArray) -> BoolArray:
-    """(n,) whether each entry's run is the longest of its track (ties: the first); entries sorted by track."""
+    """Mask (n,): whether the run of each entry is the longest of its track (ties: the first); sorted by track."""
     if len(run) == 0:
         return np.empty(0, dtype=np.bool_)
     length = np.bincount(run)

@@ -53,7 +53,7 @@ class TrackSegments:
 
 
 def is_usable(sequence: Sequence) -> BoolArray:
-    """(n,) observations whose disparity and rows allow a triangulation; with one camera, which has neither, all."""
+    """Mask (n,) of the observations whose disparity and rows allow triangulation; all True for one camera."""
     if sequence.monocular:
         return np.ones(len(sequence.observations), dtype=np.bool_)
     pixel = sequence.observations.pixel
@@ -73,7 +73,7 @@ def consecutive(sequence: Sequence) -> tuple[IntArray, IntArray]:
 
 
 def repeated(sequence: Sequence) -> BoolArray:
-    """(T-1,) intervals with copied tracks: nearly every pixel is bitwise equal to the frame before.
+    """Mask (T-1,) of the intervals with copied tracks: nearly all pixels equal those of the previous frame to the bit.
 
     A copied frame holds no motion, and its tracks often continue as other points. Sub-pixel positions of a tracker are
     never equal by chance, even for a camera at rest.
@@ -103,7 +103,7 @@ def track_segments(sequence: Sequence) -> TrackSegments:
 
 
 def track_chains(before: IntArray, after: IntArray, inlier: BoolArray, o: Observations) -> IntArray:
-    """(n,) a number for each observation: equal for those that inlier segments join, -1 where none does.
+    """Chain numbers (n,) of the observations: equal for those that inlier segments join, -1 without such a segment.
 
     `before` and `after` (m,) are the observations of the segments, `inlier` (m,) those that agree with the motion.
     """

@@ -45,7 +45,7 @@ class VelocityOutliers:
         return replace(sequence, linear_velocity=linear, angular_velocity=angular)
 
     def of_intervals(self, shift: float, linear: FloatArray, angular: FloatArray) -> FloatArray:
-        """(T-1, 6) the deviation over each interval; `linear` and `angular` (3, 3) turn its axes."""
+        """Standard deviations (T-1, 6) of the intervals, rotated by `linear` and `angular` (3, 3)."""
         parts = np.hsplit(self.deviation, 2)
         turned = [part @ np.abs(matrix.T) for part, matrix in zip(parts, (linear, angular), strict=True)]
         return held_samples(np.hstack(turned), shift)
@@ -91,7 +91,7 @@ def _outliers(recorded: FloatArray, seen: FloatArray) -> BoolArray:
 
 
 def _deviation(recorded: FloatArray, outlier: BoolArray) -> FloatArray:
-    """(T, 3) standard deviation of each interpolated velocity, zero where none is.
+    """Standard deviations (T, 3) of interpolated velocities; zero for the others.
 
     It is the RMS error of the same interpolation over samples (T, 3) that are no outliers. A run of outliers shares
     its error, which is divided among them.

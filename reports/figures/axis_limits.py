@@ -41,12 +41,12 @@ class Window:
         return Window(box.low - 0.5 * missing, box.high + 0.5 * missing)
 
     def holds(self, points: FloatArray) -> BoolArray:
-        """(n,) which of the points (n, d) lie inside."""
+        """Mask (n,) of the points (n, d) inside."""
         return np.asarray(((points >= self.low) & (points <= self.high)).all(axis=1), dtype=np.bool_)
 
 
 def known(points: FloatArray) -> FloatArray:
-    """(m, d) those of the points (n, d) that are finite."""
+    """Finite ones (m, d) of the points (n, d)."""
     return np.asarray(points[np.isfinite(points).all(axis=1)])
 
 

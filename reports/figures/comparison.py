@@ -243,6 +243,6 @@ def _aligned_paths(axes: Axes, aligned: MatchedTrajectories) -> None:
 
 
 def widest_plane(positions: FloatArray) -> FloatArray:
-    """(3, 2) orthonormal directions in which positions (n, 3) spread most."""
+    """Orthonormal directions (3, 2) in which positions (n, 3) spread most."""
     _, _, Vt = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=True)
     return np.asarray(Vt[:2].T)

@@ -180,7 +180,7 @@ def tracks_over_time(diagnosis: Diagnosis, tracks: TrackStatistics) -> Figure:
 
 
 def moving_mean(values: FloatArray, width: float) -> FloatArray:
-    """(n,) means over the `width` entries around each, as many as there are and known; NaN where none is.
+    """Moving means (n,) over the known ones of the `width` entries around each; NaN where none is known.
 
     The window is rounded to whole entries, at least one; an even one reaches one entry further back than ahead.
     """

@@ -146,7 +146,7 @@ def _place(panels: list[tuple[Axes, SubplotSpec]], around: FloatArray, size: Flo
 
 
 def _spans(length: float, before: FloatArray, after: FloatArray, ratios: ArrayLike | None, n: int) -> FloatArray:
-    """(n, 2) where the panels of each column or row begin and end, inches, with these margins before and after them."""
+    """Begin and end (n, 2), inches, of the panels of each column or row, with these margins around them."""
     share = np.ones(n) if ratios is None else np.asarray(ratios, dtype=np.float64)
     inner = share / share.sum() * max(length - float((before[:n] + after[:n]).sum()), 0.1)
     begin = np.cumsum(before[:n]) + np.concatenate([[0.0], np.cumsum(inner + after[:n])[:-1]])
@@ -203,7 +203,7 @@ def draw_minor_ticks_at_once(panels: Iterable[Axes]) -> None:
 
 
 def _unlabeled(axis: Axis) -> FloatArray:
-    """(n,) where the minor ticks of a logarithmic axis are; none where one of them has a label."""
+    """Positions (n,) of the minor ticks of a logarithmic axis; empty if one of them has a label."""
     if axis.get_scale() != "log":
         return np.empty(0)
     low, high = sorted(axis.get_view_interval())

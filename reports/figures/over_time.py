@@ -162,7 +162,7 @@ def component_panels(
 
 
 def columns(tables: Mapping[str, Columns], column: str) -> dict[str, FloatArray]:
-    """(n,) values of a column of each table."""
+    """Values (n,) of a column of each table."""
     return {name: np.asarray(table[column]) for name, table in tables.items()}
 
 

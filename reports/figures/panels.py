@@ -38,7 +38,7 @@ def median_window(n: int) -> int:
 
 
 def running_median(values: FloatArray) -> FloatArray:
-    """(n,) medians over `median_window` frames around each value; NaN where all of these are."""
+    """Running medians (n,) over `median_window` frames around each value; NaN where all of these are NaN."""
     import pandas as pd
 
     rolling = pd.Series(values).rolling(median_window(len(values)), center=True, min_periods=1)

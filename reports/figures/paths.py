@@ -150,7 +150,7 @@ def _paper_paths(run: RunData, style: Style, names: tuple[str, ...], points: Flo
 
 
 def _flat(run: RunData) -> tuple[dict[str, FloatArray], FloatArray | None]:
-    """(T, 2) paths and truth."""
+    """Paths (T, 2) of the estimators and of the truth, from above."""
     return {name: path[:, :2] for name, path in run.paths.items()}, None if run.truth is None else run.truth[:, :2]
 
 
@@ -171,7 +171,7 @@ def _draw_landmarks(axes: Axes, landmarks: FloatArray, size: float = 3.0) -> Lin
 
 
 def _directions(run: "Run", name: str) -> FloatArray:
-    """(T, 2) where the camera looks, seen from above."""
+    """Viewing directions (T, 2) of the camera from above."""
     optical_axis = run.problem.sequence.imu_T_cam[:3, 2]
     return TopView.of(run.problem).plane(run.results[name].estimate.world_T_imu[:, :3, :3] @ optical_axis)
 

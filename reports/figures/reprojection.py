@@ -160,7 +160,7 @@ def _classes(run: RunData) -> "dict[str, pd.DataFrame]":
 
 
 def _ninths(classes: "pd.DataFrame") -> FloatArray:
-    """(3, 3) median error of each ninth of the image; NaN for one without an observation."""
+    """Median errors (3, 3) of the ninths of the image; NaN for one without an observation."""
     from fgbaseline.compare.residuals.residual_classes import REGION, REGION_COLUMNS, REGION_ROWS
 
     medians = classes.loc[classes["by"] == REGION].set_index("of")["median"]
@@ -195,7 +195,7 @@ def medians_by_class(
 
 
 def observations_by_frame(problem: Problem) -> dict[str, FloatArray]:
-    """(T,) observations per frame, by the names of BANDS: their sum is that of all observations."""
+    """Numbers of observations per frame (T,), by the names of BANDS; their sum is that of all observations."""
     frame, excluded = problem.sequence.observations.frame, problem.excluded
     return {
         name: np.bincount(frame[np.isin(excluded, reasons)], minlength=problem.n_frames).astype(np.float64)
@@ -204,7 +204,7 @@ def observations_by_frame(problem: Problem) -> dict[str, FloatArray]:
 
 
 def share_within(errors: "pd.Series[float]", limits: FloatArray) -> FloatArray:
-    """(m,) share of all errors (n,), unknown ones included, that is at most each of the limits (m,)."""
+    """Shares (m,) of errors (n,) that are at most each of the limits (m,), of all errors, unknown ones included."""
     known = np.sort(errors.dropna().to_numpy(dtype=np.float64))
     return np.searchsorted(known, limits, side="right") / max(1, len(errors))
 

@@ -69,7 +69,7 @@ class RunData:
         return lines(style, self.colors, self.reference, self.names, len(self.t) if points is None else points)
 
     def column(self, name: str) -> dict[str, FloatArray]:
-        """(T,) values of a column of the series by estimator, where any of them is finite.
+        """Values (T,) of a column of the series by estimator, for estimators with a finite one.
 
         The reference is not compared with itself.
         """
@@ -78,7 +78,7 @@ class RunData:
         return {n: v for n, v in values.items() if np.isfinite(v).any()}
 
     def milliseconds(self) -> dict[str, FloatArray]:
-        """(T,) time per frame of each estimator that measured any."""
+        """Time per frame (T,), ms, of each estimator that measured it."""
         return {name: 1e3 * seconds for name, seconds in self.column("seconds").items() if seconds.any()}
 
     @property
@@ -172,7 +172,7 @@ def of_folder(folder: Path) -> RunData:
 
 
 def _axes(sequence: Mapping[str, Any]) -> FloatArray:
-    """(3, 3) rows ahead, left and up, as the summary has them."""
+    """Axes (3, 3) as rows: ahead, left and up, from the summary."""
     if "ahead" not in sequence:
         raise InputError("it was written by an earlier version, which did not say which way is ahead; run it again")
     ahead, up = (np.array(sequence[key], dtype=np.float64) for key in ("ahead", "up"))

@@ -105,7 +105,7 @@ def numbered(names: Iterable[str], lines: Lines) -> Lines:
 
 
 def position_covariances(view_R_body: FloatArray, covariance: FloatArray) -> FloatArray:
-    """(n, 6) m^2: xx, xy, xz, yy, yz, zz in the view, of pose covariances (n, 6, 6) in the axes of their body."""
+    """Position covariances (n, 6), m^2, xx, xy, xz, yy, yz, zz in the view, from pose ones (n, 6, 6) in body axes."""
     P = view_R_body @ covariance[:, :3, :3] @ np.swapaxes(view_R_body, 1, 2)
     row, column = np.triu_indices(3)
     return np.asarray(P[:, row, column])

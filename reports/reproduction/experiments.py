@@ -265,7 +265,7 @@ def path_length(path: FloatArray) -> float:
 
 
 def _corrections(path: FloatArray, predicted: FloatArray) -> FloatArray:
-    """(T-1, 6) from each predicted motion to the estimated one."""
+    """Corrections (T-1, 6), [v, w], from each predicted motion to the estimated one."""
     return se3.log(se3.inverse(se3.relative(predicted)) @ se3.relative(path))
 
 

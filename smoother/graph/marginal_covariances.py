@@ -49,12 +49,12 @@ class _Conditional(NamedTuple):
 
     @property
     def own(self) -> FloatArray:
-        """(d, d) R_i^-1 R_i^-T."""
+        """Conditional covariance (d, d), R_i^-1 R_i^-T."""
         return self.inverse @ self.inverse.T
 
     @property
     def gain(self) -> FloatArray:
-        """(d, n) G; computed on demand because it is large."""
+        """Gain G (d, n), computed on demand because it is large."""
         return self.inverse @ self.density.S()
 
 

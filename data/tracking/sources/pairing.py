@@ -30,7 +30,7 @@ class Paired(NamedTuple):
 
     @property
     def t(self) -> FloatArray:
-        """(T,) stamps in s."""
+        """Stamps (T,), s."""
         return seconds(self.stamp)
 
 
