@@ -52,7 +52,7 @@ class EventKind(StrEnum):
     DESCENT_FAILED = "descent failed"
     """Levenberg-Marquardt from one of its initial values ended with an exception"""
     STARTED_AT_ISAM2 = "started at isam2's solution only"
-    """a batch solution without the descent from dead reckoning, as wanted: it shows whether isam2 has converged"""
+    """batch solution from isam2's solution alone, as requested: it shows whether isam2 has converged"""
     ONE_START = "one start only"
     """minimum not confirmed by a second start; lowers the trust in the reference"""
     SAME_COST = "both starts end at the same cost"
@@ -69,7 +69,7 @@ class EventKind(StrEnum):
     FRAME_DISAGREES = "frame disagrees"
     """all observations of a frame rejected, because most of them exceed a chi-square quantile"""
     PROCESS_NOISE_INFLATED = "process noise inflated"
-    """noise added to a filter's motion, because successive frames disagree with it and not in themselves"""
+    """noise added to a filter's motion: successive frames disagree with it, though their observations agree"""
     INITIALIZATION_DEFERRED = "initialization deferred"
     """first observations of landmarks in a rejected frame, or at infinity in world coordinates"""
     STATE_FULL = "state full"
@@ -158,7 +158,7 @@ class Estimate(Displayed):
     seconds: FloatArray = field(default_factory=lambda: np.empty(0))
     """(T,) time spent on each frame, s"""
     seconds_total: float = nan
-    """total time including set-up and covariances, s; NaN where it is not stated: a run then measures the call"""
+    """total time including set-up and covariances, s; NaN if not given: a run then measures the call"""
     events: tuple[Event, ...] = ()
     innovations: Innovations | None = None
     """innovations (NIS) of a filter; None if it does not record them"""
@@ -195,7 +195,7 @@ class Estimate(Displayed):
         """Table with a row for each frame: x, y, z (m), qx, qy, qz, qw of `world_T_imu`, and its other quantities.
 
         sx, sy, sz are the 1-sigma of the position in world axes, m; vx, vy, vz the velocity, m/s; then seconds and NIS.
-        Each stands there where the estimate has it.
+        A quantity that the estimate lacks has no column.
         """
         columns: dict[str, object] = {**pose_columns(self.world_T_imu)}
         if self.covariance is not None:
@@ -215,7 +215,7 @@ class Estimate(Displayed):
         return plot_path(self.world_T_imu[:, :3, 3], self.name, axes)
 
     def transformed(self, new_T_old: FloatArray) -> "Estimate":
-        """Answer in another world, by-products included; `new_T_old` (4, 4) is the pose of the present world in it."""
+        """Estimate in another world, by-products included: `new_T_old` (4, 4) is the pose of the present world in the new."""
         R, landmarks, P = new_T_old[:3, :3], self.landmarks, self.state_covariance
         covariance = None if landmarks.covariance is None else R @ landmarks.covariance @ R.T
         return replace(

@@ -26,9 +26,9 @@ from .sensors import sensor_checks
 from .units import imu_units, rescaled_samples
 
 BEGINNING = 3.0
-"""s, in which the odometry's misfit is compared with that of the whole recording"""
+"""s, length of the beginning whose odometry is compared with that of the whole recording"""
 MIN_BEGINNING = 5
-"""intervals of it"""
+"""smallest number of intervals in the beginning"""
 
 
 def diagnose_inertial(sequence: Sequence, processes: int = 1) -> InertialDiagnosis:
@@ -41,9 +41,9 @@ def diagnose_inertial(sequence: Sequence, processes: int = 1) -> InertialDiagnos
 
 
 def found_start(sequence: Sequence, pixel: float, seen: Odometry | None) -> tuple[Start, InertialPath]:
-    """Start and path of samples in SI units at `pixel` px of noise, for a recording taken as it is.
+    """Start and path of a recording that is not diagnosed, in SI units, for a pixel sigma of `pixel` px.
 
-    `seen` is its odometry, where it is known. Raises ValueError with the reason where there is no start.
+    `seen` is its odometry, if already computed. Raises ValueError with the reason if no start is found.
     """
     with threadpool_limits(limits=1, user_api="blas"):
         assert sequence.imu is not None
@@ -56,7 +56,7 @@ def found_start(sequence: Sequence, pixel: float, seen: Odometry | None) -> tupl
 
 
 def no_start(seen: Odometry) -> str:
-    """The reason for which there is no start."""
+    """Reason why no start is found, a clause."""
     known = int(seen.known.sum())
     return (
         f"the start of raw inertial data needs frames whose motion the cameras show, and there are too few at the "
@@ -106,7 +106,7 @@ def _diagnose(recorded: Sequence, processes: int) -> InertialDiagnosis:
 def misfit_of_beginning(sequence: Sequence, seen: Odometry, path: InertialPath) -> float:
     """Ratio (at least 1) of the odometry's misfit at the beginning to that in the whole recording.
 
-    Tracks that lag behind in the first seconds do so together, as where a tracker starts on a moving vehicle.
+    It exceeds 1 if a tracker that started on a moving vehicle lets all tracks lag behind in the first seconds.
     """
     known = np.flatnonzero(seen.known)
     early = sequence.t[known] < sequence.t[0] + BEGINNING

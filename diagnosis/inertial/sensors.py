@@ -16,28 +16,29 @@ from .units import mean_rates
 
 MIN_INTERVALS = 20
 PRIOR = np.array([0.2] * 3 + [0.2] * 3 + [0.1, 0.1])
-"""rad/s, rad, s and share: wide beside what a recording determines"""
+"""rad/s, rad, s and share: sigmas of a prior, wide compared with what a recording determines"""
 CORRELATED = 2.0
 """factor on standard errors, since errors of neighboring intervals are correlated"""
 SYSTEMATIC = 0.02
-"""px between frames by which tracks err together: trackers shorten motions of tenths of a pixel"""
+"""px, error between frames that all tracks share: trackers shorten motions of tenths of a pixel"""
 SATURATED = 5
-"""samples in succession at the largest value of a component"""
+"""successive samples at the largest value of a component that count as saturation"""
 SATURATED_TIMES = 2
+"""smallest number of such series"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SensorChecks:
-    """Differences of the samples from the motion that the cameras see; standard errors second."""
+    """Errors of the sensors against visual odometry; the second entry of a pair is its standard error."""
 
     gyroscope_bias: tuple[FloatArray, FloatArray]
-    """(3,) rad/s"""
+    """(3,) rad/s in the axes of imu_T_cam"""
     misalignment: tuple[FloatArray, FloatArray]
     """(3,) rad, rotation vector by which imu_T_cam is turned against the gyroscope"""
     time_offset: tuple[float, float]
-    """s: positive where the samples are stamped too late"""
+    """s, positive if the stamps of the samples are too late"""
     gyroscope_scale: tuple[float, float]
-    """recorded over seen"""
+    """recorded angular velocity over that of the cameras"""
     rate_error: tuple[float, float]
     """rad/s, median against the cameras: as recorded, and without bias, misalignment and offset"""
     accelerometer_bias: FloatArray | None
@@ -45,13 +46,13 @@ class SensorChecks:
     gravity: tuple[float, float] | None
     """m/s^2, as measured along the vertical of the path, and as given"""
     saturated: tuple[tuple[str, float, int], ...]
-    """component, value and number of samples at the end of a sensor's range"""
+    """component, its value at the end of the range, and the number of samples there"""
     rest: RestNoise | None
-    """noise of a standing start"""
+    """noise measured during a standing start; None without one"""
 
     @property
     def determined(self) -> bool:
-        """Whether the cameras show enough intervals."""
+        """Whether the cameras know the motion of enough intervals."""
         return bool(np.isfinite(self.time_offset[1]))
 
 
