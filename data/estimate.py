@@ -215,7 +215,7 @@ class Estimate(Displayed):
         return plot_path(self.world_T_imu[:, :3, 3], self.name, axes)
 
     def transformed(self, new_T_old: FloatArray) -> "Estimate":
-        """Estimate in another world, with its by-products; `new_T_old` (4, 4) is the pose of the old world in the new one."""
+        """Estimate in another world, by-products included: `new_T_old` (4, 4) is the old world in the new one."""
         R, landmarks, P = new_T_old[:3, :3], self.landmarks, self.state_covariance
         covariance = None if landmarks.covariance is None else R @ landmarks.covariance @ R.T
         return replace(
