@@ -15,9 +15,9 @@ from ..graph.marginal_covariances import marginal_covariances
 from ..isam2.settings import ISAM2Settings
 
 LOOSE_SIGMA = 2e3
-"""baselines; loose prior that keeps a landmark determined which is in marginals but in no observation"""
+"""baselines, sigma of the prior of a landmark that is in marginals only, which keeps the system determinate"""
 QR_UPDATES = 30
-"""updates with QR after a failure, before the three times faster Cholesky is tried again"""
+"""number of updates with QR after a failure, before Cholesky, which is three times faster, is tried again"""
 
 
 class Checkpoint(NamedTuple):
@@ -86,8 +86,7 @@ class CheckpointedFixedLag:
         self._return_to_cholesky()
 
     def _restore(self) -> None:
-        """Rebuild the smoother from the checkpoint: as it was, else with QR, else with loose priors on its
-        landmarks."""
+        """Rebuild the smoother from the checkpoint: unchanged, if that fails with QR, and at last with loose priors."""
         held = self._with_loose_priors(
             self.checkpoint, {key for key in self.checkpoint.times if landmark_of(key) is not None}
         )
@@ -98,7 +97,7 @@ class CheckpointedFixedLag:
                 continue
             self._qr_updates = QR_UPDATES if qr else 0
             return
-        raise UnrecoverableError("what the window knew cannot be restored after a failure")
+        raise UnrecoverableError("the window cannot be rebuilt after GTSAM failed")
 
     def _return_to_cholesky(self) -> None:
         """Return to Cholesky after `QR_UPDATES` updates with QR."""

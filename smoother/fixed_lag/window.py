@@ -36,7 +36,7 @@ class FixedLagWindow:
         self._observed: dict[int, list[int]] = {}
         self._times_initialized: Counter[int] = Counter()
         self.key: dict[int, int] = {}
-        """key of each landmark in the window; a new key where it is observed again after it was marginalized"""
+        """landmark in the window -> its key; a landmark observed again after marginalization has a new key"""
         self.oldest = 0
         """frame in the window"""
         self.newest = -1
@@ -133,7 +133,7 @@ class FixedLagWindow:
         )
 
     def take_newest(self, states: FrameStates) -> None:
-        """Set the newest state; the covariance is needed, and so set, with raw inertial data only."""
+        """Set the newest state, and with raw inertial data its covariance, which the next prediction needs."""
         state = state_keys(self.newest, states.inertial)
         states.take(self.newest, self._estimate(state))
         if states.inertial:

@@ -12,7 +12,7 @@ from fgbaseline.geometry.so3 import hat3
 
 MAX_STEPS = 4
 SMALL_STEP = 0.1
-"""standard deviations: a correction after which the weights no longer matter"""
+"""size of a correction, in sigmas, at which the iteration ends: weights no longer change"""
 
 
 def refine_predicted_pose(
