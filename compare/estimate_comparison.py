@@ -118,7 +118,7 @@ class Result(Displayed):
 
     estimate: Estimate
     reprojection: pd.DataFrame
-    """one row per observation of its landmarks: see `compare.reprojection`"""
+    """one row per observation of the estimated landmarks: see `compare.reprojection`"""
     divergence: pd.DataFrame | None
     """differences from the reference, one row per frame: see `compare.pose_errors`; None without a reference"""
     truth: pd.DataFrame | None

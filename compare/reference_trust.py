@@ -27,9 +27,9 @@ FAR_REMARK = f"far: disparity of 0 to {FAR_POINT:g} px, masked"
 RESOLUTION = 1e-5
 """smallest reported difference from the batch solution: position RMSE in m, cost as a relative difference"""
 NOTABLE_INFLATION = 1.1
-"""factor in the pixel sigma from which on it is reported"""
+"""inflation of the pixel sigma from which on it is reported"""
 NOTABLE = 0.05
-"""share of observations without positive disparity above which it is reported"""
+"""share of observations without positive disparity above which the share is a reason"""
 SHARE = "share"
 """unit of a part of a whole, which tables print in percent"""
 CRITERIA = {
@@ -112,9 +112,9 @@ class TrustLimits:
     given_up_frames: tuple[float, float] = (0.0, 0.05)
     """share of frames whose observations were dropped"""
     batch_cost: tuple[float, float] = (0.005, 0.05)
-    """relative excess of its cost over that of the batch solution"""
+    """relative excess of the cost of the reference over that of the batch solution"""
     batch_position: tuple[float, float] = (0.1, 2.0)
-    """RMSE of its positions from those of the batch solution, in baselines of the rig (0.1 m for one camera)"""
+    """RMSE of the reference's positions from the batch solution, in baselines of the rig (0.1 m for one camera)"""
     impossible_share: tuple[float, float] = (0.2, 0.5)
     """share of the `expected_observations` without positive disparity"""
 

@@ -1,4 +1,4 @@
-"""TOML files as they stand: their syntax, before a model says what may be in them."""
+"""Syntax of TOML files, before a model validates the content."""
 
 import re
 import tomllib

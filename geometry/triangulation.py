@@ -32,7 +32,7 @@ LEAST_PIVOT = 1e-12
 ROUNDING = 1e-14
 """Decrease of a point's cost by a step, relative to the cost, that drowns in rounding."""
 FARTHER = 0.01
-"""least share of a point's inverse depth that a step leaves, so that no step passes infinity"""
+"""smallest factor by which a step may change an inverse depth, so that no step passes infinity"""
 INFINITE = 1e-3
 """px, disparity in the nearest camera, at a baseline of a unit length, of a point at infinity: its iteration ends"""
 

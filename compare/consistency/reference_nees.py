@@ -77,7 +77,7 @@ def difference_covariance(P: FloatArray, P_ref: FloatArray) -> FloatArray:
 
 
 def _difference_and_share(P: FloatArray, P_ref: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """`difference_covariance` and the `smallest_share` by which it is judged."""
+    """Covariances of the difference, and the smallest shares that decide whether they are positive definite."""
     P, P_ref = 0.5 * (P + np.swapaxes(P, 1, 2)), 0.5 * (P_ref + np.swapaxes(P_ref, 1, 2))
     difference, share = P - P_ref, smallest_share(P, P_ref)
     difference[~((share > NEGLIGIBLE) & is_positive_definite(difference))] = np.nan

@@ -107,7 +107,7 @@ def reprojection_by(table: pd.DataFrame, what: str) -> pd.DataFrame:
 def used_by_all(estimates: Iterable[Estimate]) -> BoolArray | None:
     """Observations (n,) that every estimate used; None without such an estimate.
 
-    Estimates that use no observation by design and those that failed are ignored.
+    Failed estimates, and those that by design use no observation, are ignored.
     """
     using = [e.used for e in estimates if e.used.any() and e.status is not Status.FAILED]
     return np.asarray(np.logical_and.reduce(using), dtype=np.bool_) if using else None

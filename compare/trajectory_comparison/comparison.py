@@ -116,7 +116,7 @@ class Comparison(Displayed):
 
     @property
     def pixels(self) -> "dict[str, Pixels]":
-        """Reprojection of every trajectory that has one, the reference first."""
+        """Reprojection errors of the trajectories that have them, the reference first."""
         every = {self.reference.name: self.reference_pixels}
         every |= {name: result.pixels for name, result in self.results.items()}
         return {name: pixels for name, pixels in every.items() if pixels is not None}

@@ -60,7 +60,7 @@ class Resolved:
 
     @property
     def landmarks(self) -> Landmarks | None:
-        """Landmarks in its world, where the source has them."""
+        """Landmarks in the world of the poses; None if the source has none."""
         return self.source.landmarks if isinstance(self.source, ParsedTrajectory) else None
 
     @property

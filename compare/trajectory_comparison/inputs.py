@@ -1,4 +1,4 @@
-"""Inputs of a comparison: trajectories with what came with them, and the recording behind them."""
+"""Inputs of a comparison: trajectories with landmarks, covariances and remarks, and the recording."""
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING

@@ -30,7 +30,7 @@ LOOSENED = 2.0
 """factor of the deviations of a start in motion: what it says then counts a quarter. Larger factors make filters less
 consistent: what is linear within the errors is not within what is claimed"""
 EXCITED = 0.1
-"""1-sigma of the scale, as a share of it, above which the motion does not excite it"""
+"""relative 1-sigma of the scale above which the motion does not excite the scale"""
 UNKNOWN_DEPTHS = InverseDepthPrior(0.25, 0.25)
 """1/m, where no depth is found"""
 

@@ -42,7 +42,7 @@ Window = tuple[WindowData, FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WindowBatch:
-    """Several windows concatenated, so that their terms are computed together."""
+    """Batch of windows: their data concatenated, so that terms are computed in one call."""
 
     frame: IntArray
     """(n,) frame among the F frames of all windows"""

@@ -1,4 +1,4 @@
-"""Evaluation: every limit against every estimator that it matches."""
+"""Evaluation of every limit on every estimator that it matches."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

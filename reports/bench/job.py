@@ -47,7 +47,7 @@ class Simulated:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One run of a bench: everything that determines its results."""
+    """Job of a bench: all inputs that determine the results of one run."""
 
     source: Recorded | Simulated
     seed: int

@@ -167,7 +167,7 @@ def report_of(
 
 
 def _compared_meanwhile(paired: PairedEntries) -> Comparison:
-    """Comparison of all estimates, in a fork, while this process imports what draws them."""
+    """Compares all estimates in a fork, while this process imports the drawing libraries."""
     from fgbaseline.data.parallel import background_map, cores
 
     with background_map(lambda _: compare_paired(paired), 1, cores()) as compared:

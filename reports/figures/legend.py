@@ -18,7 +18,7 @@ SAMPLES = 200
 SAME = 1.5
 """px of a PNG: lines nearer than this everywhere coincide"""
 STRIPE = 1.4
-"""points by which a line is wider than the one on it"""
+"""pt, difference in width between a line and the one drawn on it"""
 BELOW_REFERENCE = 1.9
 """zorder of what coincides with the reference"""
 
@@ -56,7 +56,7 @@ def _legend_columns(widths: Sequence[int], room: int) -> int:
 
 
 def _widen_coinciding(axes: Axes) -> None:
-    """Makes lines that coincide a ribbon: each is wider than those that lie on it.
+    """Shows coinciding lines as a ribbon: each is wider than the lines drawn on it.
 
     The reference, the line of REFERENCE_ORDER, lies on the lines that coincide with it, and below all others.
     """

@@ -59,7 +59,7 @@ class Panel:
     """decades of its logarithmic ordinate, at most; None: logarithmic only where the estimators differ by decades"""
     title: str = ""
     smooth: bool = False
-    """whether its lines jump from frame to frame, so that running medians are drawn"""
+    """whether values vary strongly from frame to frame, so that running medians are drawn"""
     degrees: float | None = None
     """degrees of freedom of the chi-square of a consistent estimator, over `per`, whose band is drawn"""
     per: float = 1.0

@@ -99,7 +99,7 @@ class MeasuredRun(_Record):
     @model_validator(mode="before")
     @classmethod
     def _of_a_comparison(cls, document: Any) -> Any:
-        """`comparison.json` calls them estimates, and the sequence by its name."""
+        """Brings `comparison.json` into the form of `summary.json`: estimates become estimators, the sequence a mapping."""
         if not isinstance(document, dict) or "estimates" not in document:
             return document
         sequence = {"name": document.get("sequence") or ""}
@@ -290,7 +290,7 @@ def _values(estimator: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _beginnings(metric: str) -> list[str]:
-    """The path, and those of what it is in, the longest first."""
+    """Key path and its prefixes, the longest first."""
     return [metric.rsplit(".", n)[0] for n in range(metric.count(".") + 1)]
 
 

@@ -1,4 +1,4 @@
-"""Estimators of a run that names none, and names in one text, as options and keywords have them."""
+"""Default estimators of a run, and lists of names in one text."""
 
 DEFAULT_ESTIMATORS = ("dead-reckoning", "ekf", "isam2", "isam2-online")
 ONE_CAMERA_ESTIMATORS = ("dead-reckoning", "joint-ekf", "isam2", "isam2-online")
@@ -9,5 +9,5 @@ than a fifth of the time of isam2 (0.15 to 0.18 on the KITTI drives of 9,500 and
 
 
 def names_in(text: str | None) -> tuple[str, ...]:
-    """Names that commas separate, without blanks around them; empty ones are left out."""
+    """Names in a text, separated by commas; blanks around names and empty names are removed."""
     return tuple(name.strip() for name in (text or "").split(",") if name.strip())

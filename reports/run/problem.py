@@ -175,7 +175,7 @@ def check_estimators(names: tuple[str, ...], functions: Mapping[str, Callable[..
 
 
 def import_estimators(names: tuple[str, ...]) -> None:
-    """Imports the estimators; one that cannot be imported fails later, with its reason."""
+    """Imports the estimators now; an import that fails is reported later, as the failure of that estimator."""
     for name in names:
         with suppress(Exception):
             find_estimator(name)

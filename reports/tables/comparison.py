@@ -1,4 +1,4 @@
-"""Tables of a comparison: the one that people read, and those of table.csv and metrics.csv."""
+"""Tables of a comparison: for page and terminal, and for table.csv and metrics.csv."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

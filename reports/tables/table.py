@@ -196,7 +196,7 @@ def print_table(
 
 
 class _Width(NamedTuple):
-    """Characters of a column: so that no word breaks, and so that no line does."""
+    """Width of a column in characters: the least, at which no word breaks, and that at which no line breaks."""
 
     least: int
     full: int
