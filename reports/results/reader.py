@@ -99,7 +99,7 @@ class MeasuredRun(_Record):
     @model_validator(mode="before")
     @classmethod
     def _of_a_comparison(cls, document: Any) -> Any:
-        """Brings `comparison.json` into the form of `summary.json`: estimates become estimators, the sequence a mapping."""
+        """Brings `comparison.json` into the form of `summary.json`: estimates are estimators, sequence is a mapping."""
         if not isinstance(document, dict) or "estimates" not in document:
             return document
         sequence = {"name": document.get("sequence") or ""}
