@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .consistency.nis import NisSummary, nis_per_degree, nis_summary
     from .consistency.pose_sigma import PoseSigma, pose_sigma
     from .consistency.reference_nees import ReferenceNees, reference_nees
-    from .consistency.state import (
+    from .consistency.state_nees import (
         quantity_summary,
         state_error,
         state_nees,
@@ -106,7 +106,9 @@ else:
             "consistency.nis": "NisSummary nis_per_degree nis_summary",
             "consistency.pose_sigma": "PoseSigma pose_sigma",
             "consistency.reference_nees": "ReferenceNees reference_nees",
-            "consistency.state": "quantity_summary state_error state_nees velocity_and_bias_errors velocity_and_biases",
+            "consistency.state_nees": (
+                "quantity_summary state_error state_nees velocity_and_bias_errors velocity_and_biases"
+            ),
             "landmarks.dynamic_landmarks": "dynamic_landmarks",
             "landmarks.map_difference": "map_by_depth map_difference",
             "residuals.cost": "cost",

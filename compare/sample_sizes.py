@@ -11,7 +11,7 @@ from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.strapdown import BLOCKS
 
-from .consistency.state import QUANTITIES
+from .consistency.state_nees import QUANTITIES
 from .estimate_comparison import InertialEvidence, Result, Run, known
 
 

@@ -1,7 +1,8 @@
 """Linearization of an observation: predicted rows of world points, and their Jacobians w.r.t. pose and point.
 
-Filters, structureless factors and diagnosis linearize here (`predict`), for a stereo pair and for one camera: the
-source paper's equations 11 and 13 (docs/glossary.md). GTSAM's factors linearize themselves (`smoother.graph.factors`).
+Filters and structureless factors linearize here (`predict`), for a stereo pair and for one camera: the source paper's
+equations 11 and 13 (docs/glossary.md). Odometry, windows and triangulation apply the chain rule to the rows of the
+camera (`StereoCamera.row_derivatives`). GTSAM's factors linearize themselves (`smoother.graph.factors`).
 """
 
 from dataclasses import dataclass

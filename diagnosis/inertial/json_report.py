@@ -11,7 +11,7 @@ from fgbaseline.data.wording import vector
 from ..findings.json_report import header
 from .findings import inertial_findings
 from .result import InertialDiagnosis
-from .sensors import SensorChecks
+from .sensor_calibration import SensorChecks
 
 
 def inertial_to_json(found: InertialDiagnosis, findings: tuple[Finding, ...] | None = None) -> dict[str, Any]:

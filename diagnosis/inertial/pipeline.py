@@ -22,7 +22,7 @@ from .baseline_unit import baseline_unit
 from .imu_spikes import without_spikes
 from .result import InertialDiagnosis
 from .sensor_axes import in_imu_axes, sensor_axes
-from .sensors import sensor_checks
+from .sensor_calibration import sensor_checks
 from .units import imu_units, rescaled_samples
 
 BEGINNING = 3.0

@@ -19,7 +19,7 @@ from ..repairs.repaired_sequence import RepairedTracks
 from .baseline_unit import BaselineUnit
 from .imu_spikes import Spikes
 from .sensor_axes import SensorAxes
-from .sensors import SensorChecks
+from .sensor_calibration import SensorChecks
 from .units import ImuUnits
 
 

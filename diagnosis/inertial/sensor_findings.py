@@ -6,7 +6,7 @@ from fgbaseline.data.finding import Finding
 from fgbaseline.data.wording import per_cent, vector
 
 from ..noise.calibration_fit import SIGNIFICANT
-from .sensors import SensorChecks
+from .sensor_calibration import SensorChecks
 
 MIN_BIAS, MIN_ANGLE, MIN_OFFSET, MIN_SCALE = 0.005, np.deg2rad(0.5), 0.003, 0.02
 """rad/s, rad, s and share that are reported; the biases are in the state of the estimators"""

@@ -9,7 +9,7 @@ from ..conventions.rig_plausibility import unconfirmed_position
 from ..inertial.imu_spikes import without_spikes
 from ..inertial.result import InertialDiagnosis
 from ..inertial.sensor_axes import in_imu_axes
-from ..inertial.sensors import sensor_checks
+from ..inertial.sensor_calibration import sensor_checks
 from ..inertial.units import imu_units, rescaled_samples
 from ..odometry.monocular_odometry import monocular_odometry
 from ..tracks.recording_faults import unusable

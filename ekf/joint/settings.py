@@ -22,7 +22,7 @@ class Linearization(StrEnum):
     TEXTBOOK = "textbook"
     """Jacobians at the latest estimate, P unchanged"""
     FIRST_ESTIMATE = "first-estimate"
-    """Jacobians of landmarks at initialization and of poses as predicted, so that N is constant (same paper)"""
+    """FEJ: Jacobians of landmarks at initialization and of poses as predicted, so that N is constant (same paper)"""
     INVARIANT = "invariant"
     """Jacobians at the latest estimate; after an update P <- B P B^T, where B takes N at the prediction to N at the
     result and is the identity as nearly as that allows: P then has its meaning in coordinates in which N does not

@@ -7,7 +7,7 @@ import pandas as pd
 from pydantic import Field
 
 from fgbaseline import compare
-from fgbaseline.compare.consistency.state import QUANTITIES
+from fgbaseline.compare.consistency.state_nees import QUANTITIES
 from fgbaseline.compare.estimate_comparison import InertialEvidence, Result, Run
 from fgbaseline.geometry.strapdown import BLOCKS
 

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from fgbaseline import compare, ekf
 from fgbaseline.compare.consistency.anees import average_nees
-from fgbaseline.compare.consistency.state import QUANTITIES
+from fgbaseline.compare.consistency.state_nees import QUANTITIES
 from fgbaseline.compare.estimate_comparison import compare_all
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3, so3

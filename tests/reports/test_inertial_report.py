@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from fgbaseline import compare, ekf
-from fgbaseline.compare.consistency.state import QUANTITIES
+from fgbaseline.compare.consistency.state_nees import QUANTITIES
 from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import Truth
 from fgbaseline.geometry import InputError
