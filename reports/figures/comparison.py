@@ -159,6 +159,8 @@ def _box(panel: Axes, y: float, values: FloatArray, color: str) -> None:
     caps = y + BOX / 4 * np.array([-1, 1, apart, 0, 0, apart, 0, 0, apart, -1, 1])
     panel.plot(whiskers, caps, color=color, linewidth=1.0)
     panel.plot([median, median], [y - BOX / 2, y + BOX / 2], color="#222222", linewidth=1.6, zorder=2.1)
+    rmse = float(np.sqrt(np.mean(values**2)))  # beyond the whisker where few pairs make it
+    panel.plot([rmse], [y], color="#222222", marker="D", markersize=3.5, linestyle="none", zorder=2.2)
 
 
 def segments(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
@@ -183,7 +185,7 @@ EACH: Captioned = {
     "paths": (paths, "Trajectories from above, {alignment} to {reference}."),
     "errors": (errors, "Position and rotation error against {reference} over time, {alignment}."),
     "growth": (growth, "Position and heading error against {reference} over its path length, {alignment}."),
-    "relative": (relative, "Relative errors (RPE), {pairs}; boxes hold the middle half, whiskers 90 %."),
+    "relative": (relative, "Relative errors (RPE), {pairs}; boxes hold the middle half, whiskers 90 %; diamond: RMSE."),
     "segments": (segments, "Segment errors ({lengths})."),
     "map": (map_difference, "Median distance of landmarks from those of {reference}, in the camera frame, by depth."),
 }

@@ -35,7 +35,7 @@ from .evidence import (
     sample_requirement,
     threshold_sentences,
 )
-from .run_accuracy import ate_sentences, divergence_sentences, overconfidence_sentences
+from .run_accuracy import ate_sentences, divergence_sentences, overconfidence_sentences, pose_nees_sentences
 
 SUSPECTED = "wrong matches, moving points or points that cannot be triangulated"
 """reasons of `WRONG_MATCH`"""
@@ -57,6 +57,7 @@ def verdict(run: Run) -> list[str]:
         partial(_with_status, Status.RECOVERED),  # the table marks them, and their loss shows in the ranking
         _maximum_divergence,
         _missing_poses,
+        pose_nees_sentences,
         _consistency,
         _invalid_covariances,
         _held_out,
@@ -141,8 +142,8 @@ def _maximum_divergence(run: Run) -> list[str]:
     if wrong and overall is not None:
         each = listed(f"{per_cent(share)} ({name})" for name, share in wrong.items())
         sentences.append(
-            f"Within {AROUND:g} s of the first frame above the threshold the mask excluded {each} of the observations "
-            f"as {SUSPECTED}; {per_cent(overall)} in the whole recording."
+            f"Share of the observations that the mask excluded as {SUSPECTED}, within {AROUND:g} s of the first frame "
+            f"above the threshold: {each}; in the whole recording {per_cent(overall)}."
         )
     return sentences
 

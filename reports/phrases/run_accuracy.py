@@ -154,10 +154,10 @@ def _closeness(run: Run, found: PairedRanking) -> list[str]:
     sigma = run.results[str(run.reference)].evidence.sigma.position_rmse
     if not max(found.rmse.values()) < WITHIN_SIGMAS * sigma:
         return []
-    solved = f" Trusted means that {run.reference} solves this problem well, not that its error is below its sigma."
+    solved = f" Trusted means that {run.reference} solves this problem well, not that it is close to the truth."
     return [
         f"The divergences (RMSE) of {listed(found.rmse)} are below {WITHIN_SIGMAS:g} times the position sigma of "
-        f"{run.reference} itself, {number(sigma)} m RMS: the ranking shows which is closer to {run.reference}, not "
+        f"{run.reference}, {number(sigma)} m RMS: the ranking shows which is closer to {run.reference}, not "
         f"which is closer to the truth.{solved if run.trust.verdict is Verdict.TRUSTED else ''}"
     ]
 
@@ -172,17 +172,19 @@ def _uncertain(differences: Mapping[tuple[str, str], RmseDifference]) -> str:
     unreliable = {names: d for names, d in differences.items() if not d.reliable}
     if not unreliable:
         return ""
-    why = "as the errors stay correlated over much of the recording"
+    why = "the errors stay correlated over much of the recording"
     if len(unreliable) > FEW:
         blocks = plural(min(int(d.blocks) for d in unreliable.values()), "block")
         n = len(unreliable)
-        return f" The 95 % intervals of {n} of these differences are uncertain, {why}: they rest on {blocks}."
+        return f" The 95 % intervals of {n} of these differences are rough, from {blocks}: {why}."
     each = [
-        f"{larger} is {number(d.value)} m [{number(d.low)}, {number(d.high)}] above {smaller}, from "
-        f"{plural(int(d.blocks), 'block')}"
+        f"{number(d.value)} m [{number(d.low)}, {number(d.high)}] ({larger} above {smaller}, "
+        f"{plural(int(d.blocks), 'block')})"
         for (larger, smaller), d in unreliable.items()
     ]
-    return f" The 95 % interval of the difference is uncertain, {why}: {listed(each)}."
+    title = "The difference is" if len(each) == 1 else "The differences are"
+    interval = "Its 95 % interval is" if len(each) == 1 else "Their 95 % intervals are"
+    return f" {title} {listed(each)}. {interval} rough: {why}."
 
 
 def _over(run: Run, found: PairedRanking) -> str:
@@ -231,15 +233,35 @@ def _is_inconsistent(result: Result) -> bool:
     return result.nees is not None and _median(result.nees) > overconfidence_bound()
 
 
+def pose_nees_sentences(run: Run) -> list[str]:
+    """Estimators with a NEES above the bound of one pose that are not called overconfident: their sigma is larger."""
+    each, n = [], run.problem.n_frames
+    for result in run.answered:
+        if is_overconfident(run, result):
+            continue
+        difference = None if result.name in run.unranked else result.evidence.difference
+        measured = {
+            "NEES": result.nees,
+            "reference NEES": None if difference is None or 2 * difference.left_out.sum() > n else difference.nees,
+        }
+        medians = {name: _median(nees) for name, nees in measured.items() if nees is not None}
+        above = [f"{name} {number(nees)}" for name, nees in medians.items() if nees > overconfidence_bound()]
+        if above:
+            each.append(f"{result.name} ({listed(above)})")
+    bound = f"above {number(overconfidence_bound())}, the 97.5 % quantile of one pose"
+    though = "though the position sigma is not below the RMSE"
+    return [f"Median NEES {bound}, {though}: {listed(each)}."] if each else []
+
+
 def _claim(run: Run, result: Result) -> str:
     distance, other = _actual(run, result)
     ratio, difference = result.evidence.sigma_ratio, result.evidence.difference
     if difference is not None and difference.is_overconfident:
         difference = None  # its NEES is that of the few frames in which P - P_ref is positive definite
     figures = {
-        "median NEES": float("nan") if result.nees is None else _median(result.nees),
+        "median NEES of the pose": float("nan") if result.nees is None else _median(result.nees),
         "median reference NEES": float("nan") if difference is None else _median(difference.nees),
-        "median sigma ratio": float("nan") if ratio is None else float(ratio["position"].median()),
+        f"median sigma ratio to {run.reference}": float("nan") if ratio is None else float(ratio["position"].median()),
     }
     known = ", ".join(f"{name} {number(value)}" for name, value in figures.items() if np.isfinite(value))
     measured = f"; {known}" if known else ""
