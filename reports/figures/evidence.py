@@ -23,7 +23,7 @@ AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z,
 QUANTITIES = {
     "velocity": ("velocity", "m/s"),
     "gyroscope_bias": ("gyro bias", "rad/s"),
-    "accelerometer_bias": ("acc. bias", "m/s²"),
+    "accelerometer_bias": ("acc. bias", "m/s^2"),
 }
 """columns of `compare.velocity_and_bias_errors`, and how little room there is for their headings"""
 OVER_BAND, BELOW_ONE = "above the band: covariance too small", "below 1: overconfident"

@@ -106,7 +106,7 @@ def _undefined(run: Run) -> str:
 def _biases(run: Run, data: RunData) -> Iterable[Chart | None]:
     """Charts of the components; `bounds` is how far the band around a line reaches to either side."""
     truth, hint = run.problem.sequence.truth, "estimates with ±3-sigma bounds"
-    for name, unit in (("gyroscope_bias", "rad/s"), ("accelerometer_bias", "m/s²")):
+    for name, unit in (("gyroscope_bias", "rad/s"), ("accelerometer_bias", "m/s^2")):
         true = None if truth is None else getattr(truth, name)
         for i, axis in enumerate("xyz"):
             lines = numbered(run.results, data.column(f"{name}_{axis}"))

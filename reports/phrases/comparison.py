@@ -87,8 +87,7 @@ def _up_direction(comparison: Comparison) -> list[str]:
     if comparison.up_from == ASSUMED_UP:
         return [
             f"Up is not known from these files; {_shown_up(comparison)} in the world of {name} is assumed "
-            "(--up sets it).",
-            "View, height, left, above and heading depend on it.",
+            "(--up sets it). View, height, left, above and heading depend on it."
         ]
     if comparison.up_from == "--up":
         return []

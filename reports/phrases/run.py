@@ -24,6 +24,7 @@ from fgbaseline.compare.divergence_onset import (
 from fgbaseline.compare.estimate_comparison import Run, known, same_frames
 from fgbaseline.compare.sample_sizes import insufficient_truth, truth_sample
 from fgbaseline.data import Status
+from fgbaseline.data.wording import noun
 
 from ..formatting import counted, distance, grouped, listed, number, per_cent
 from ..results.evidence import frame_ranges, summarize_sigma
@@ -180,14 +181,18 @@ def _consistency(run: Run) -> list[str]:
 
 
 def _invalid_covariances(run: Run) -> list[str]:
-    each = []
+    found = []
     for result in run.answered:
         bad = np.flatnonzero(result.evidence.covariance == CovarianceState.NOT_POSITIVE_DEFINITE)
         if len(bad):
             where = frame_ranges(bad)
             if len(where) > LONGEST_LIST:
                 where = f"first {bad[0]}, last {bad[-1]}"
-            each.append(f"{number(len(bad))} of {result.name} ({'frame' if len(bad) == 1 else 'frames'} {where})")
+            found.append(((len(bad), f"{noun(len(bad), 'frame')} {where}"), result.name))
+    each = [
+        f"{number(n)} of {names[0] if len(names) == 1 else f'each of {listed(names)}'} ({where})"
+        for (n, where), names in grouped(found).items()
+    ]
     return [f"Pose covariances that are not positive definite, which NEES leaves out: {listed(each)}."] if each else []
 
 

@@ -57,7 +57,7 @@ def ate_sentences(run: Run) -> list[str]:
         return [f"There is no ATE: no estimator has a pose where the ground truth ({source}, {coverage}) has one."]
     each = listed(f"{resolved(rmse[name], ate_resolution(run))} m for {name}" for name in known)
     alignment = "SE(3) alignment" if run.problem.imu is None else "alignment in yaw and position"
-    sentences = [f"ATE (RMSE after {alignment} to the ground truth, {source}, {coverage}): {each}."]
+    sentences = [f"ATE (RMSE to the ground truth {source}, after {alignment}, over {coverage}): {each}."]
     if run.reference not in known:
         return sentences
     errors = {name: tables[name]["position"].to_numpy() for name in known if run.results[name].ate_common is not None}
@@ -248,9 +248,10 @@ def pose_nees_sentences(run: Run) -> list[str]:
         above = [f"{name} {number(nees)}" for name, nees in medians.items() if nees > overconfidence_bound()]
         if above:
             each.append(f"{result.name} ({listed(above)})")
-    bound = f"above {number(overconfidence_bound())}, the 97.5 % quantile of one pose"
+    bound = f"above {number(overconfidence_bound())} (97.5 % quantile of one pose)"
     though = "though the position sigma is not below the RMSE"
-    return [f"Median NEES {bound}, {though}: {listed(each)}."] if each else []
+    small = "Its pose covariance is" if len(each) == 1 else "Their pose covariances are"
+    return [f"Median NEES {bound}, {though}: {listed(each)}. {small} too small in some direction."] if each else []
 
 
 def _claim(run: Run, result: Result) -> str:
