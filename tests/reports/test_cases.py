@@ -57,7 +57,7 @@ RIGHT: dict[str, tuple[tuple[str, ...], dict[str, Any], dict[str, float]]] = {
 
 SAID: dict[str, tuple[tuple[str, ...], str]] = {
     "01-tum-fr2-desk": (("gt.txt", "est.txt"), "gt: 1 of 4,500 lines repeats the time stamp before"),
-    "03-orbslam3-ns": (("gt.csv", "f_mono.txt"), "Each of gt and f_mono: its time stamps are in nanoseconds and"),
+    "03-orbslam3-ns": (("gt.csv", "f_mono.txt"), "f_mono: its time stamps are in nanoseconds and"),
     "06-okvis2": (
         ("gt.csv", "okvis2_nohead.csv"),
         "its quaternions are read as x y z w: the median misfit",
