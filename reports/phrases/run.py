@@ -36,7 +36,7 @@ from .evidence import (
     sample_requirement,
     threshold_sentences,
 )
-from .run_accuracy import ate_sentences, divergence_sentences, overconfidence_sentences, pose_nees_sentences
+from .run_accuracy import ate_sentences, divergence_sentences, overconfidence_sentences, reference_nees_sentences
 
 SUSPECTED = "wrong matches, moving points or points that cannot be triangulated"
 """reasons of `WRONG_MATCH`"""
@@ -58,7 +58,7 @@ def verdict(run: Run) -> list[str]:
         partial(_with_status, Status.RECOVERED),  # the table marks them, and their loss shows in the ranking
         _maximum_divergence,
         _missing_poses,
-        pose_nees_sentences,
+        reference_nees_sentences,
         _consistency,
         _invalid_covariances,
         _held_out,
@@ -190,7 +190,7 @@ def _invalid_covariances(run: Run) -> list[str]:
                 where = f"first {bad[0]}, last {bad[-1]}"
             found.append(((len(bad), f"{noun(len(bad), 'frame')} {where}"), result.name))
     each = [
-        f"{number(n)} of {names[0] if len(names) == 1 else f'each of {listed(names)}'} ({where})"
+        f"{number(n)} {f'of {names[0]}' if len(names) == 1 else f'each of {listed(names)}'} ({where})"
         for (n, where), names in grouped(found).items()
     ]
     return [f"Pose covariances that are not positive definite, which NEES leaves out: {listed(each)}."] if each else []

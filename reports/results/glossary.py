@@ -28,16 +28,16 @@ TERMS: Mapping[str, str] = {
     "comparison: distance from the reference after the alignment of --align.",
     SIGMA: "Square root of the trace of an estimator's own position covariance, m, with the start fixed (pose of frame "
     "0; with raw inertial data its position and heading); RMS over the frames. It is the expected 3D RMSE, not the "
-    "sigma of one axis. The sentences at the top call an estimator overconfident if its position sigma is below its "
-    "RMSE and, beside that, its median NEES or reference NEES is above 14.4 (97.5 % quantile of one pose) or, in most "
-    "frames, P_ref exceeds 1.1 P in some direction.",
+    "sigma of one axis. The sentences at the top call an estimator overconfident if its median NEES is above 14.4 "
+    "(97.5 % quantile of one pose), or if its position sigma is below its divergence and, beside that, its median "
+    "reference NEES is above 14.4 or P_ref exceeds 1.1 P in some direction in most frames.",
     DIVERGENCE: "Distance of the positions from those of the reference, m, without alignment: all have the same start.",
     RPE: "Error of the motion between two poses a delta apart (--delta), m and °.",
     "drift": "Relative error over a tenth of the path length (or duration), per meter (or second).",
     SEGMENTS: "KITTI's relative error over segments of 100 to 800 m, % and °/m; on a short path over shorter segments.",
     REPROJECTION: "Norm of the pixel residual (uL, vL, uR, vR) of an observation, px; its RMS is twice the pixel "
-    "sigma. Over all observations of an estimator's landmarks, also those that the mask excludes. Common observations "
-    "are those that every estimator with landmark updates used.",
+    "sigma. Over all observations of an estimator's landmarks, including those that the mask excludes. Common "
+    "observations are those that every estimator with landmark updates used.",
     OBSERVATIONS: "Share of the unmasked observations that an estimator used, %.",
     HELD_OUT: "Reprojection error of tracks that no estimator used, each half predicted from the other along the "
     "trajectory, px. It judges motion over a second or two, not drift. A trajectory is separated from the best where "
