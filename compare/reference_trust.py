@@ -13,7 +13,7 @@ import numpy as np
 from fgbaseline.data import Estimate, EventKind, Problem, Status
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.wording import distance, per_cent, plural
+from fgbaseline.data.wording import distance, number, per_cent, plural
 from fgbaseline.geometry import disparity
 from fgbaseline.geometry.monocular_camera import UNIT_LENGTH
 
@@ -145,7 +145,7 @@ def trust(
     given_up = len(lost) / problem.n_frames
     inflated = inflation_remark(problem)
     expected_scale = (
-        f"{inflated}; errors without correlation would give {1.0 / problem.pixel_inflation:.2g}"
+        f"{number(1.0 / problem.pixel_inflation)} is expected of uncorrelated errors, as {inflated}"
         if inflated
         else "1 is expected"
     )
@@ -157,15 +157,15 @@ def trust(
     judged = [
         (
             _criterion(limit, "pixel_scale", pixel, inflated),
-            f"normalized pixel residual RMS {_rounded(pixel)} (limit {limit.pixel_scale[0]:g}; {expected_scale})",
+            f"normalized pixel residual RMS {number(pixel)} (limit {limit.pixel_scale[0]:g}; {expected_scale})",
         ),
         (
             _criterion(limit, "motion_scale", motion),
-            f"normalized motion residual RMS {_rounded(motion)} (limit {limit.motion_scale[0]:g}; up to 1 is expected)",
+            f"normalized motion residual RMS {number(motion)} (limit {limit.motion_scale[0]:g}; at most 1 is expected)",
         ),
         (
             _criterion(limit, "used_share", share, FAR_REMARK if far else ""),
-            f"it used {plural(n_used, 'observation')}: {per_cent(share)} of the {recorded}{far}, "
+            f"{reference.name} used {plural(n_used, 'observation')}: {per_cent(share)} of the {recorded}{far}, "
             f"{per_cent(n_used / max(1, int(problem.mask.sum())))} of the unmasked ones",
         ),
         (
@@ -185,7 +185,7 @@ def trust(
         (
             _criterion(limit, "untied_intervals", untied / intervals),
             f"{untied:,} of {plural(intervals, 'pair')} of consecutive frames ({per_cent(untied / intervals)}) have no "
-            f"used landmark in common; there only the {motion_data} constrain the motion, and a jump would go unnoticed"
+            f"used landmark in common; there only the {motion_data} constrain the motion"
             if untied
             else "",
         ),
@@ -275,7 +275,7 @@ def _compared_with_batch(
     agrees = "agrees" if verdict is Verdict.TRUSTED else "disagrees"
     side = "above" if excess > 0.0 else "below"
     cost_gap = f"{per_cent(abs(excess))} {side} the batch's" if abs(excess) >= RESOLUTION else "the same"
-    path_gap = f"{distance(rmse)} (RMSE{lengths}) away" if rmse >= RESOLUTION else "the same"
+    path_gap = f"differs by {distance(rmse)} (RMSE{lengths})" if rmse >= RESOLUTION else "is the same"
     text = f"a batch solution{start} {agrees}: the negative log-likelihood is {cost_gap}, the trajectory {path_gap}"
     return _BatchComparison(verdict, text, criteria)
 
@@ -286,7 +286,3 @@ def _verdict_above(value: float, limits: tuple[float, float]) -> Verdict:
 
 def _verdict_below(value: float, limits: tuple[float, float]) -> Verdict:
     return Verdict(int(not value >= limits[0]) + int(not value >= limits[1]))
-
-
-def _rounded(value: float) -> str:
-    return f"{value:.2g}"

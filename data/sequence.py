@@ -209,7 +209,7 @@ class Sequence(Displayed):
         t, v, w, label = self.t, self.linear_velocity, self.angular_velocity, "speed, m/s"
         if self.imu is not None:
             t, v, w = self.imu.t, self.imu.specific_force, self.imu.angular_velocity
-            label = "specific force, m/s²"
+            label = "specific force, m/s^2"
         counts = np.bincount(self.observations.frame, minlength=self.n_frames).astype(np.float64)
         start = self.t[0]
         panels = {

@@ -55,10 +55,15 @@ def number(value: object) -> str:
 
 
 def per_cent(share: float) -> str:
-    """A share of one in percent, `below 0.001 %` for a smaller one; a dash for NaN."""
+    """A measured share of one in percent: `98.0 %`, `below 0.001 %` for a smaller one; a dash for NaN."""
     if 0.0 < abs(share) < 1e-5:
         return "below 0.001 %"
-    return f"{100.0 * share:.3g} %" if isfinite(share) else DASH
+    return f"{number(100.0 * share)} %" if isfinite(share) else DASH
+
+
+def limit_per_cent(share: float) -> str:
+    """A limit or setting in percent, exact: `5 %`."""
+    return f"{100.0 * share:g} %"
 
 
 def distance(value: float) -> str:

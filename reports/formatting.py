@@ -6,9 +6,9 @@ from math import isfinite
 from typing import TypeVar
 
 from fgbaseline.data.finding import MEASURES
-from fgbaseline.data.wording import DASH, INFINITY, MINUS, distance, listed, number, per_cent, plural
+from fgbaseline.data.wording import DASH, INFINITY, MINUS, distance, limit_per_cent, listed, number, per_cent, plural
 
-__all__ = ["DASH", "INFINITY", "MINUS", "distance", "listed", "number", "per_cent"]
+__all__ = ["DASH", "INFINITY", "MINUS", "distance", "limit_per_cent", "listed", "number", "per_cent"]
 NO_BREAK = "\N{NO-BREAK SPACE}"
 RESOLUTION = 1e-5
 """m and degrees, below which estimates of a run do not differ: `isam2` does not propagate smaller changes"""

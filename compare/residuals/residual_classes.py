@@ -15,7 +15,7 @@ DEPTHS = (0.0, 5.0, 10.0, 20.0, 40.0, 80.0, np.inf)
 """m, edges of the depth classes"""
 AGES = (1, 2, 4, 7, 13, 26)
 """first observation of each class of track age"""
-DISTANCE, AGE, REGION, SIDE = "distance", "track age", "region", "side"
+DISTANCE, AGE, REGION, SIDE = "distance", "track age", "image region", "camera"
 REGION_ROWS, REGION_COLUMNS = ("top", "middle", "bottom"), ("left", "center", "right")
 
 

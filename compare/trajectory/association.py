@@ -61,7 +61,7 @@ class MatchedTrajectories(Displayed):
             "within" if self.association is Association.NEAREST else f"{self.interpolated} interpolated, stamps within"
         )
         shifted = f", {self.estimate.name} {self.offset:+.4g} s" if self.offset else ""
-        left = f"left out: {self.left_out_reference} of the reference, {self.left_out_estimate} of the estimate"
+        left = f"left out: {self.left_out_reference:,} of the reference, {self.left_out_estimate:,} of the estimate"
         stamps = f"{how} {self.tolerance:.3g} s{shifted}" if self.reference.stamped else "by frame"
         return f"{plural(len(self), 'pose')} paired ({stamps}; {left}); {self.alignment.caption}"
 

@@ -202,7 +202,7 @@ def _decided(each: Resolved, assumed: float = 0.0, other: float = 0.0) -> tuple[
         return each, 0
     order = each.orders[1]
     remark = (
-        f"its quaternions are read as {in_words(order)}: so its rotations fit to {other:.3g}° in the median, and to "
+        f"its quaternions are read as {in_words(order)}: the median misfit of its rotations is {other:.3g}°, and "
         f"{assumed:.3g}° as {in_words(each.orders[0])}"
     )
     return replace(each, order=order).remarked(remark), 1

@@ -26,7 +26,7 @@ def tied_truth(truth: Truth, path: FloatArray, frames_per_second: float) -> tupl
         return truth, "the ground truth has no pose in any frame of the problem"
     known = np.flatnonzero(truth.known & np.isfinite(path).all(axis=(1, 2)))
     if len(known) == 0:
-        return truth, "the ground truth has no pose at the start of the problem and is not tied to its world"
+        return truth, "the ground truth has no pose at the start of the problem and is not aligned with its world"
     up, how = _up(truth, path, known)
     level = np.eye(4)
     level[:3, :3] = so3.rotation_to_z(up)
@@ -39,7 +39,9 @@ def tied_truth(truth: Truth, path: FloatArray, frames_per_second: float) -> tupl
     shift = np.eye(4)
     shift[:3, 3] = np.mean(path[at, :3, 3] - turned.world_T_imu[at, :3, 3], axis=0)
     where = "at frame 0" if count == 1 else f"over frames {at[0]} to {at[-1]}, the first with truth"
-    return turned.transformed(shift), f"the ground truth is leveled by {how}; heading and position are tied {where}"
+    return turned.transformed(
+        shift
+    ), f"the ground truth is leveled by {how}; its heading and position are aligned {where}"
 
 
 def path_from(pose: FloatArray, path: FloatArray) -> FloatArray:
@@ -58,7 +60,7 @@ def path_from(pose: FloatArray, path: FloatArray) -> FloatArray:
 def _up(truth: Truth, path: FloatArray, known: np.ndarray) -> tuple[FloatArray, str]:
     """Up direction (3,) in the world of the truth, and its source."""
     if truth.up is not None:
-        return truth.up, "the up that is stated"
+        return truth.up, "its stated up direction"
     measured = np.einsum("nij,nj->ni", truth.world_T_imu[known, :3, :3], path[known, 2, :3]).mean(axis=0)
     measured /= np.linalg.norm(measured)
     z = np.array([0.0, 0.0, 1.0])

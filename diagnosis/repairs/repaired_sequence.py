@@ -82,7 +82,7 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None
     offset = significant_offset(diagnosis)
     if offset:
         sequence = _without_offset(sequence, offset)
-        done.append(f"columns uR {'reduced' if offset > 0 else 'increased'} by {abs(offset):.2f} px")
+        done.append(f"uR {'reduced' if offset > 0 else 'increased'} by {abs(offset):.2f} px")
     if diagnosis.shift != 0.0:
         done.append(f"velocities shifted by {signed(diagnosis.shift, 2)} intervals{_estimated_shift(diagnosis)}")
     path = _path(diagnosis, odometry(sequence) if offset else diagnosis.odometry)

@@ -128,28 +128,33 @@ def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
         return None
     names = [name for name in data.names if any(name in motions for motions in data.relative.values())]
     rows, inch = len(data.relative), (1.0 if style.titled else 0.6)
-    figure = Figure(figsize=(style.width, 0.9 * inch + rows * inch * (0.75 + 0.27 * len(names))))
+    figure = Figure(figsize=(style.width, 1.1 * inch + rows * inch * (0.75 + 0.27 * len(names))))
     panels = figure.subplots(rows, 2, squeeze=False, sharey=True)
+    handles: list[Any] = []
     for row, (delta, motions) in zip(panels, data.relative.items(), strict=True):
         for panel, column, unit in zip(row, ("translation", "rotation_deg"), ("m", "°"), strict=True):
-            _boxes(panel, names, data.colors, motions, column)
+            handles += _boxes(panel, names, data.colors, motions, column)
             panel.set(xlabel=f"over {delta}: {column.removesuffix('_deg')}, {unit}", xlim=(0.0, None))
     over = " and ".join(data.relative)
-    title_and_legend(figure, f"Relative errors (RPE) over {over}, {data.pairs}", style=style)
+    legend = handles[:2] if style.titled else []
+    title_and_legend(figure, f"Relative errors (RPE) over {over}, {data.pairs}", legend, style)
     return figure
 
 
 def _boxes(
     panel: Axes, names: list[str], color: Mapping[str, str], motions: Mapping[str, Columns], column: str
-) -> None:
+) -> list[Any]:
+    """Draws a box for each of the names; gives the legend's handles of median and RMSE."""
+    handles: list[Any] = []
     for name, table in motions.items():
-        _box(panel, names.index(name), without_nan(table[column]), color[name])
+        handles += _box(panel, names.index(name), without_nan(table[column]), color[name])
     panel.set_yticks(range(len(names)), [safe_text(name) for name in names])
     panel.set_ylim(len(names) - 0.5, -0.5)
     panel.grid(axis="y", visible=False)
+    return handles
 
 
-def _box(panel: Axes, y: float, values: FloatArray, color: str) -> None:
+def _box(panel: Axes, y: float, values: FloatArray, color: str) -> list[Any]:
     """Horizontal box at a height, as `Axes.boxplot` has it, which imports pyplot and makes more artists."""
     (at,) = boxplot_stats(values, whis=(5, 95))
     low, q1, median, q3, high, apart = (*(at[key] for key in ("whislo", "q1", "med", "q3", "whishi")), np.nan)
@@ -158,7 +163,10 @@ def _box(panel: Axes, y: float, values: FloatArray, color: str) -> None:
     whiskers = [low, low, apart, low, q1, apart, q3, high, apart, high, high]
     caps = y + BOX / 4 * np.array([-1, 1, apart, 0, 0, apart, 0, 0, apart, -1, 1])
     panel.plot(whiskers, caps, color=color, linewidth=1.0)
-    panel.plot([median, median], [y - BOX / 2, y + BOX / 2], color="#222222", linewidth=1.6, zorder=2.1)
+    dark: dict[str, Any] = {"color": "#222222", "zorder": 2.1}
+    middle = panel.plot([median, median], [y - BOX / 2, y + BOX / 2], linewidth=1.6, label="median", **dark)
+    rmse = float(np.sqrt(np.mean(values**2)))  # beyond the whisker where few pairs make it
+    return [*middle, *panel.plot([rmse], [y], marker="D", markersize=3.5, linestyle="none", label="RMSE", **dark)]
 
 
 def segments(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
@@ -183,7 +191,7 @@ EACH: Captioned = {
     "paths": (paths, "Trajectories from above, {alignment} to {reference}."),
     "errors": (errors, "Position and rotation error against {reference} over time, {alignment}."),
     "growth": (growth, "Position and heading error against {reference} over its path length, {alignment}."),
-    "relative": (relative, "Relative errors (RPE), {pairs}; boxes hold the middle half, whiskers 90 %."),
+    "relative": (relative, "Relative errors (RPE), {pairs}; boxes hold the middle half, whiskers 90 %; diamond: RMSE."),
     "segments": (segments, "Segment errors ({lengths})."),
     "map": (map_difference, "Median distance of landmarks from those of {reference}, in the camera frame, by depth."),
 }

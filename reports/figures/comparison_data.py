@@ -32,7 +32,7 @@ ALIGNED = {
     Align.SE3: "SE(3)-aligned",
     Align.SIM3: "Sim(3)-aligned",
 }
-PAIRS = {True: "all pairs", False: "pairs end to end"}
+PAIRS = {True: "all pairs", False: "consecutive pairs"}
 LENGTHS = {True: "KITTI's lengths", False: "lengths fitted to the trajectory, not KITTI's"}
 """whether lengths are those of the KITTI devkit -> words"""
 

@@ -23,10 +23,10 @@ AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z,
 QUANTITIES = {
     "velocity": ("velocity", "m/s"),
     "gyroscope_bias": ("gyro bias", "rad/s"),
-    "accelerometer_bias": ("acc. bias", "m/s²"),
+    "accelerometer_bias": ("acc. bias", "m/s^2"),
 }
 """columns of `compare.velocity_and_bias_errors`, and how little room there is for their headings"""
-OVER_BAND, BELOW_ONE = "overconfident above the band", "overconfident below 1"
+OVER_BAND, BELOW_ONE = "above the band: covariance too small", "below 1: overconfident"
 
 
 def nees(run: RunData) -> Figure | None:
@@ -56,7 +56,8 @@ def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
         Panel("sigma ratio,\nposition", "sigma_ratio_position", 1.95, 5.0, BELOW_ONE, expected=1.0),
         Panel("sigma ratio,\nrotation", "sigma_ratio_rotation", 1.95, 5.0, BELOW_ONE, expected=1.0),
     ]
-    return time_panels(run, panels, "Consistency without truth", style, linewidth=1.0)
+    title = f"Consistency, compared with {safe_text(run.reference)}" if run.reference else "Consistency"
+    return time_panels(run, panels, title, style, linewidth=1.0)
 
 
 def three_sigma(

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from fgbaseline.geometry import FloatArray
 
 from .style import REFERENCE_ORDER, SCREEN, Style
 
+TITLE_LETTERS = 82
+"""characters in a line of a title, which is bold and larger than the legend"""
 SAMPLES = 200
 """points of a line that are compared"""
 SAME = 1.5
@@ -24,7 +27,7 @@ BELOW_REFERENCE = 1.9
 
 
 def title_and_legend(figure: Figure, title: str, handles: Iterable[Any] = (), style: Style = SCREEN) -> None:
-    """Title on top of a figure (not on paper) and below it one legend: each label once, in rows.
+    """Title on top of a figure (not on paper), in lines, and below it one legend: each label once, in rows.
 
     Called when the panels are drawn. On the screen the lower ones of lines that coincide become wider.
     """
@@ -32,7 +35,8 @@ def title_and_legend(figure: Figure, title: str, handles: Iterable[Any] = (), st
     figure.set_label(title)
     if not style.titled and not by_label:
         return
-    bold: dict[str, Any] = {"title": title, "title_fontproperties": {"weight": "bold", "size": 11.5}}
+    font = {"weight": "bold", "size": 11.5}
+    bold: dict[str, Any] = {"title": fill(title, TITLE_LETTERS), "title_fontproperties": font}
     legend = figure.legend(
         list(by_label.values()),
         list(by_label),

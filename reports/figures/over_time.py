@@ -13,7 +13,7 @@ from fgbaseline.geometry import FloatArray
 
 from .axis_limits import common_window, signed_range
 from .legend import title_and_legend
-from .palette import GREEN
+from .palette import GRAY
 from .panels import (
     CONSISTENT,
     chi_square_band,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COMPONENTS = {
-    "position": "distance, m",
+    "position": "position, m",
     "rotation_deg": "rotation, °",
     "along": "ahead, m",
     "across": "to the left, m",
@@ -96,7 +96,9 @@ def time_panels(run: RunData, wanted: Sequence[Panel], title: str, style: Style,
             width = 0.9 if style.titled else 0.6
             bands.append(chi_square_band(on, panel.degrees, panel.band, per=panel.per, width=width))
         if panel.expected is not None:
-            on.axhline(panel.expected, color=GREEN, linewidth=0.9, zorder=1.5)
+            bottom, top = on.get_ylim()
+            on.set_ylim(min(bottom, 0.7 * panel.expected), max(top, 1.4 * panel.expected))
+            on.axhline(panel.expected, color=GRAY, linestyle=":", linewidth=0.9, zorder=2.5)
         few_ticks(on, style)
         on.set_ylabel(panel.label)
         remarks = [panel.title, smoothed(len(run.t)) if panel.smooth and style.titled else ""]
@@ -200,7 +202,9 @@ def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
         together = " and ".join(map(safe_text, (name, *others)))
         handles += plot_series(axes[0], run.t, {name: times[name]}, run.line(), linewidth=0.9, label=together)
     interval = 1e3 * float(np.median(np.diff(run.t)))
-    fit_log(axes[0], {**times, "": np.array([interval])})
+    fit_log(axes[0], times)
+    low, high = axes[0].get_ylim()
+    axes[0].set_ylim(min(low, interval / 1.5), max(high, 1.5 * interval))
     look: dict[str, Any] = {"color": "#888888", "linewidth": 1.0, "linestyle": ":"}
     real_time = axes[0].axhline(interval, **look, label=f"interval between frames ({interval:.3g} ms)")
     axes[0].set_ylabel("time, ms")

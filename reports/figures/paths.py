@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from fgbaseline.data.top_view import TopView
-from fgbaseline.data.wording import plural
+from fgbaseline.data.wording import distance, plural
 from fgbaseline.geometry import FloatArray
 
 from .axis_limits import Window, common_window, known, robust_window
@@ -196,7 +196,7 @@ def _divergence(run: RunData, name: str) -> str:
     series = run.series[name]
     if name == run.reference or "divergence_position" not in series:
         return ""
-    return f": {series['divergence_position'].max():.3g} m"
+    return f": {distance(float(series['divergence_position'].max()))}"
 
 
 def _outside(box: Window, points: FloatArray, what: str) -> list[str]:

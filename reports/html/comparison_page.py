@@ -21,11 +21,11 @@ from .rendering import render_page
 CAPTIONS: Mapping[str, str] = {
     "paths": "Aligned as the caption of the table describes, seen from above.",
     "errors": "Differences of paired poses along the reference's direction of travel, to its left and up.",
-    "growth": "Errors over the path length; a heading to the left is positive. An alignment over many poses "
-    "spreads the error over all of them: growth is seen with --align first-pose.",
-    "relative": "Boxes hold the middle half, whiskers 5 to 95 %, the line is the median. Relative errors do not "
-    "depend on alignment or earlier errors.",
-    "segments": "Mean over all segments of a length, per meter.",
+    "growth": "A heading error to the left is positive. An alignment over all poses spreads the error over all of "
+    "them; --align first-pose shows how it grows.",
+    "relative": "Boxes hold the middle half of the errors, whiskers reach from 5 to 95 %. The line is the median, the "
+    "diamond the RMSE of the table. Relative errors do not depend on alignment or on earlier errors.",
+    "segments": "Mean error over all segments of a length, divided by the length.",
     "map": "Landmarks are matched by index. Distances in the world include the drift of the trajectories; those in the "
     "camera frames do not.",
     "three_sigma": "Error of each pose in its own body frame with ±3-sigma bounds of its covariance; both are "
@@ -34,6 +34,13 @@ CAPTIONS: Mapping[str, str] = {
     "estimate.",
 }
 """captions by the beginning of a figure's name"""
+BEST = {
+    True: "Best of a row in bold.",
+    False: "Best of a row in bold, only where the row is over the same poses of all estimates.",
+}
+"""by whether all estimates have the same stamps"""
+ABSENT: Mapping[str, str] = {"nees": "NEES", "passing": "first pose above the threshold", "map": "map difference"}
+"""words for keys of missing values that do not explain themselves"""
 STILLS = ("paths", "errors")
 """figures that show what the interactive plots show"""
 
@@ -53,7 +60,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
         replace(
             table,
             name="metric",
-            caption=f"{table.caption} Best of a row in bold.",
+            caption=f"{table.caption} {BEST[comparison.ranking.same]}",
             rows=tuple(_with_intervals_below(row) for row in table.rows),
         )
     )
@@ -65,9 +72,9 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
             title=f"{', '.join(estimates)} against {reference.name}",
             about=_about(summary),
             verdict=verdict(comparison),
-            table=Section("table", "Every estimate", [grid], "Table"),
+            table=Section("table", "Metrics by estimate", [grid], "Metrics"),
             sections=[
-                Section("behind", "What stands behind the numbers", [behind] if behind is not None else [], "Findings"),
+                Section("behind", "Trust in the reference", [behind] if behind is not None else []),
                 Section(
                     "over-time",
                     "Over time",
@@ -77,11 +84,10 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
                     "evidence",
                     _beyond_title(drawn, bool(bands)),
                     [*beyond, *folded],
-                    "Beyond the trajectories",
                 ),
-                Section("stills", "Still figures", [still_figures(stills)] if stills else []),
+                Section("stills", "Static figures", [still_figures(stills)] if stills else []),
             ],
-            settings={"Missing values": notes, "Files": sources, "Settings": settings},
+            settings={"Missing values": _named(notes), "Files": sources, "Settings": settings},
             colors=data.colors,
             plots=comparison_plots(comparison, data),
             still_paths=drawn.get("paths"),
@@ -93,7 +99,7 @@ def _about(summary: Summary) -> str:
     reference = summary.reference
     lasting = "" if reference.duration_s is None else f" in {number(reference.duration_s)} s"
     paired = all(e.pairing.pairs == e.poses == reference.poses for e in summary.estimates.values())
-    interpolated = "" if paired else " Between the poses of an estimate, lines are interpolated."
+    interpolated = "" if paired else " Lines are interpolated between the poses of an estimate."
     pixels = "" if summary.sequence is None else f" Reprojection is of the observations of {summary.sequence}."
     return (
         f"The reference has {counted(reference.poses, 'pose')}{lasting} along {number(reference.path_m)} m.{pixels}"
@@ -107,6 +113,12 @@ def _beyond_title(names: Iterable[str], has_bands: bool) -> str:
     parts = [text for beginning, text in of.items() if any(name.startswith(beginning) for name in names)]
     title = listed([*parts, *(["±3-sigma bounds"] if has_bands else [])])
     return title[:1].upper() + title[1:]
+
+
+def _named(notes: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    """The notes of all estimates, by estimate and the words for their keys."""
+    every = ((name, key, why) for name, of in notes.items() for key, why in of.items())
+    return {f"{name}: {ABSENT.get(key, key.replace('_', ' '))}": why for name, key, why in every}
 
 
 def _with_intervals_below(row: Row) -> Row:

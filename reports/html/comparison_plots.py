@@ -114,7 +114,7 @@ def _charts(comparison: Comparison, data: ComparisonData, t: FloatArray, paths: 
             difference("along", f"Ahead of {of}", "m", "along"),
             difference("across", f"To the left of {of}", "m", "across"),
             difference("above", f"Above {of}", "m", "up"),
-            difference("heading", f"Heading error against {of}, to the left", "°", "heading_deg"),
+            difference("heading", f"Heading error against {of}, left positive", "°", "heading_deg"),
             chart("height", "Height above the reference's start", "m", lines(heights)),
         ],
         "Consistency": [chart("nees", "NEES", "", lines(nees), **poses)],

@@ -32,7 +32,7 @@ from .plot_encoding import (
     position_covariances,
 )
 
-ALL_OBSERVATIONS = "over all observations of an estimator's landmarks, also those that the mask excludes"
+ALL_OBSERVATIONS = "over all observations of an estimator's landmarks, including those that the mask excludes"
 EDGE = 8.0
 """px between the outermost observations and the frame drawn around them"""
 
@@ -51,13 +51,14 @@ def charts(run: Run, data: RunData) -> list[Chart]:
     heights = numbered(run.results, {name: path[:, 2] for name, path in data.paths.items()})
     if data.truth is not None:
         heights |= {TRUTH_LINE: data.truth[:, 2]}
-    unaligned = "difference from ground truth; all start at the true pose"
+    fixed = "pose" if run.problem.imu is None else "position and heading"
+    unaligned = f"difference from ground truth; all start at its {fixed}"
     every = {"log": True, "smooth": True, "hint": ALL_OBSERVATIONS}
     pose, rows = expected(DEGREES_OF_FREEDOM, frames), data.nis_rows or 1.0
-    ratio = {"log": True, "middle": 1.0, "hint": "expected above 1 for a filter"}
+    ratio = {"log": True, "middle": 1.0, "hint": "expected of a consistent filter: at least 1 (dotted line)"}
     times, interval = numbered(run.results, data.milliseconds()), 1e3 * float(np.median(run.problem.sequence.dt))
     absent = [r.name for r in run.answered if r.name not in data.milliseconds()]
-    without = f"; {listed(absent)} {'has' if len(absent) == 1 else 'have'} no time of each frame" if absent else ""
+    without = f"; {listed(absent)} {'has' if len(absent) == 1 else 'have'} no time per frame" if absent else ""
     hint = f"below the dotted line an estimator runs in real time{without}"
     real_time = {"log": True, "smooth": True, "hint": hint}
     beside, innovations = dict(pose), expected(rows, frames, per=rows)
@@ -67,27 +68,27 @@ def charts(run: Run, data: RunData) -> list[Chart]:
     groups = {
         "Divergence and errors": [
             of("divergence", f"Divergence from {reference}, unaligned", "m", "divergence_position"),
-            of("rotation", f"Rotation from {reference}, unaligned", "°", "divergence_rotation_deg"),
+            of("rotation", f"Rotation difference from {reference}, unaligned", "°", "divergence_rotation_deg"),
             of("along", f"Ahead of {reference}", "m", "divergence_along"),
             of("across", f"To the left of {reference}", "m", "divergence_across"),
             of("above", f"Above {reference}", "m", "divergence_up"),
             of("error", "Unaligned position error", "m", "truth_position", hint=unaligned),
-            of("error-rotation", "Unaligned rotation error", "°", "truth_rotation_deg"),
+            of("error-rotation", "Unaligned rotation error", "°", "truth_rotation_deg", hint=unaligned),
             chart("height", "Height above the start", "m", heights),
         ],
         "Velocity and biases": [
             of("velocity", "Unaligned velocity error", "m/s", "truth_velocity"),
-            of("velocity-divergence", f"Velocity from {reference}, unaligned", "m/s", "divergence_velocity"),
+            of("velocity-divergence", f"Velocity difference from {reference}, unaligned", "m/s", "divergence_velocity"),
             *_biases(run, data),
         ],
         "Pixels": [of("reprojection", "Median reprojection error by frame", "px", "reprojection_median", **every)],
         "Consistency": [
             of("nees", "NEES", "", "nees", **pose),
-            of("nees-reference", f"Reference NEES, to {reference}", "", "nees_reference", **beside),
+            of("nees-reference", f"Reference NEES against {reference}", "", "nees_reference", **beside),
             of("nees-state", "NEES of the state", "", "nees_state", **expected(float(STATE), frames)),
             of("nis", "NIS per degree of freedom", "", "nis_per_row", smooth=True, **innovations),
-            of("sigma-position", f"Sigma ratio of position, to {reference}", "", "sigma_ratio_position", **ratio),
-            of("sigma-rotation", f"Sigma ratio of rotation, to {reference}", "", "sigma_ratio_rotation", **ratio),
+            of("sigma-position", f"Sigma ratio to {reference}, position", "", "sigma_ratio_position", **ratio),
+            of("sigma-rotation", f"Sigma ratio to {reference}, rotation", "", "sigma_ratio_rotation", **ratio),
         ],
         "Runtime": [chart("time", "Time per frame", "ms", times, middle=interval, **real_time)],
     }
@@ -104,8 +105,8 @@ def _undefined(run: Run) -> str:
 
 def _biases(run: Run, data: RunData) -> Iterable[Chart | None]:
     """Charts of the components; `bounds` is how far the band around a line reaches to either side."""
-    truth, hint = run.problem.sequence.truth, "the estimates, and three of their sigmas to either side"
-    for name, unit in (("gyroscope_bias", "rad/s"), ("accelerometer_bias", "m/s²")):
+    truth, hint = run.problem.sequence.truth, "estimates with ±3-sigma bounds"
+    for name, unit in (("gyroscope_bias", "rad/s"), ("accelerometer_bias", "m/s^2")):
         true = None if truth is None else getattr(truth, name)
         for i, axis in enumerate("xyz"):
             lines = numbered(run.results, data.column(f"{name}_{axis}"))
@@ -203,5 +204,5 @@ def _bookmarks(run: Run) -> list[dict[str, Any]]:
     if worst is not None:
         t = run.problem.sequence.t
         middle = int(np.argmin(np.abs(t - t[0] - worst.second - 0.5)))
-        bookmarks.append({"frame": middle, "text": "most wrong or moving points"})
+        bookmarks.append({"frame": middle, "text": "most wrong matches or moving points"})
     return sorted(bookmarks, key=lambda bookmark: int(bookmark["frame"]))

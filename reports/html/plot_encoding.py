@@ -94,7 +94,7 @@ def _needs_log_scale(lines: Iterable[FloatArray]) -> bool:
 def expected(degrees: float, of: str, *, per: float = 1.0) -> dict[str, Any]:
     """Look of a chart of a consistent estimator's chi-square with so many degrees of freedom, over `per`."""
     low, median, high = chi_square_limits(degrees, per)
-    hint = f"the band holds 95 % of the {of}, the dotted line is their median"
+    hint = f"the band holds 95 % of the {of}; the dotted line is their median"
     return {"log": True, "band": (low, high), "middle": median, "hint": hint}
 
 

@@ -36,29 +36,29 @@ from .plot_encoding import embedded_json
 from .rendering import render_page
 
 CAPTIONS: Mapping[str, str] = {
-    "paths_overlaid": "Seen from above; all start at the same pose. Squares mark the ends.",
-    "paths_side_by_side": "All panels have the same limits. Green dots: landmarks. Dashed: ground truth, where there "
-    "is one; else the thin line is the reference.",
+    "paths_overlaid": "Seen from above; all have the same start. Squares mark the ends.",
+    "paths_side_by_side": "All panels have the same limits. Green dots: landmarks. Dashed: ground truth. Without "
+    "it the thin line is the reference.",
     "divergence": "Position and rotation difference from the reference, without alignment, and the position "
     "difference ahead of the reference, to its left and above it.",
-    "error_to_truth": "Difference from ground truth in the same components, without alignment: all start at the true "
-    "pose.",
+    "error_to_truth": "Difference from ground truth in the same components, without alignment: all have the start of "
+    "the ground truth. With raw inertial data this is its position and heading; roll and pitch are estimated.",
     "height": "Along the up direction of the recording.",
-    "reprojection_over_time": "Above, the median error over all observations of an estimator's landmarks, also "
-    "those that the mask excludes. Below, all recorded observations of each frame, and which of them the mask "
-    "excludes.",
-    "reprojection_distribution": "Solid over all observations of an estimator's landmarks, also those that the mask "
-    "excludes; dashed over those it used. Curves farther left are better.",
+    "reprojection_over_time": "Above, the median error over all observations of an estimator's landmarks, "
+    "including those that the mask excludes. Below, the recorded observations of each frame, and which of them the "
+    "mask excludes.",
+    "reprojection_distribution": "Solid over all observations of an estimator's landmarks, including those that the "
+    "mask excludes; dashed over those that it used. Curves farther left are better.",
     "nees": "The band holds 95 % of the frames of a consistent estimator. Above it an estimator is overconfident, "
-    "below it conservative.",
+    "below it conservative. The errors of one run are time-correlated, so the share within the band varies.",
     "held_out": "Each half of a track is predicted from its other half along each trajectory. Trajectories whose "
     "intervals overlap can still be separated: the table has the paired difference from the best.",
-    "consistency": "The bands of NEES and NIS hold 95 % of the frames of a consistent filter; the NEES is "
+    "consistency": "The bands of NEES and NIS hold 95 % of the frames of a consistent filter. The NEES is "
     "time-correlated. Where the pixel noise is inflated, a NIS far below the band is expected. The sigma ratio of a "
-    "filter is expected above 1.",
+    "consistent filter is at least 1 (dotted line).",
     "reprojection_classes": "Flat lines mean that the error does not depend on distance or track age. The "
-    "dotted curve is expected where the noise is as assumed; residuals are smaller to its left, as with inflated "
-    "pixel noise, larger to its right.",
+    "dotted curve is expected if the noise is as assumed. Curves to its left have smaller residuals, as with inflated "
+    "pixel noise; curves to its right larger ones.",
     "image_regions": "Errors that grow towards an edge can indicate distortion or a wrong rectification; near points "
     "at the bottom of the image and wrong matches raise them as well. All panels share "
     "one logarithmic scale.",
@@ -110,7 +110,7 @@ def render(
             title=run.problem.sequence.name,
             about=_about(run, sequence, problem),
             verdict=verdict(run),
-            table=Section("table", "Every estimator", [table, *added], "Table"),
+            table=Section("table", "Metrics by estimator", [table, *added], "Metrics"),
             sections=_sections(run, summary, stills, plots, images),
             record=[Note("Remarks on the recording and the problem", is_heading=True), Sentences(remarks, "remarks")]
             if remarks
@@ -131,7 +131,7 @@ def _about(run: Run, sequence: Mapping[str, Any], problem: Mapping[str, Any]) ->
         f"{', '.join(run.results)} on {counted(sequence['frames'], 'frame')} ({', '.join(spans)}) with "
         f"{counted(sequence['observations'], kind)} of {counted(sequence['tracks'], 'track')}"
         f"{' (after repair)' if problem['repairs'] else ''}. Preset {problem['preset']}: "
-        f"{number(problem['features'])} of the tracks are left to the estimators."
+        f"{number(problem['features'])} of the tracks have unmasked observations."
     )
 
 
@@ -167,14 +167,12 @@ def _sections(
         Section("one-frame", "One frame in the images", frame if seen else [], "One frame", needs_script=True),
         Section(
             "evidence",
-            f"Beyond the trajectories: {'' if run.held_out is None else 'held-out tracks, '}consistency, residuals, "
-            f"map",
+            "Consistency, residuals and map" if run.held_out is None else "Held-out error, consistency, residuals, map",
             beyond if evidence.columns else [],
-            "Beyond the trajectories",
         ),
         Section("components", "Reprojection errors by component", [Grid(components, "")] if components.rows else []),
-        Section("left-out", "What was left out, and why", out, "Left out"),
-        Section("stills", "Still figures", [still_figures(stills)] if stills else []),
+        Section("left-out", "Excluded observations and events", out),
+        Section("stills", "Static figures", [still_figures(stills)] if stills else []),
     ]
 
 
@@ -195,6 +193,6 @@ def _behind(run: Run, plots: Mapping[str, Any] | None) -> list[Block]:
     inner: list[Block] = [Grid(findings, "plain findings")] if findings.rows else []
     if problem.repairs:
         repairs = [f"{repair[0].upper()}{repair[1:]}." for repair in problem.repairs]
-        inner += [Note("Repairs, the same for all estimators", is_heading=True), Sentences(repairs, "repairs")]
+        inner += [Note("Repairs (the same for all estimators)", is_heading=True), Sentences(repairs, "repairs")]
     title = f"The recording: {found if problem.diagnosed or findings.rows else 'it could not be diagnosed'}"
     return [*blocks, Folded(title, inner, "diagnosis", is_open=bool(findings.rows))]

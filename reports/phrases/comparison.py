@@ -87,8 +87,7 @@ def _up_direction(comparison: Comparison) -> list[str]:
     if comparison.up_from == ASSUMED_UP:
         return [
             f"Up is not known from these files; {_shown_up(comparison)} in the world of {name} is assumed "
-            "(--up sets it).",
-            "View, height, left, above and heading depend on it.",
+            "(--up sets it). View, height, left, above and heading depend on it."
         ]
     if comparison.up_from == "--up":
         return []
@@ -103,7 +102,10 @@ def _up_direction(comparison: Comparison) -> list[str]:
 def _file_remarks(comparison: Comparison) -> list[str]:
     """Remarks on the files, and the metrics that missing orientations leave out."""
     entries = [comparison.reference, *(result.entry for result in comparison.results.values())]
-    sentences = [f"{entry.name}: {remark}." for entry in entries for remark in entry.remarks]
+    sentences = [
+        f"{names[0] if len(names) == 1 else f'Each of {listed(names)}'}: {remark}."
+        for remark, names in grouped((remark, entry.name) for entry in entries for remark in entry.remarks).items()
+    ]
     bare = [entry.name for entry in entries if not entry.trajectory.oriented]
     if bare:
         sentences.append(
@@ -129,13 +131,15 @@ def _time_offsets(comparison: Comparison) -> list[str]:
 
 
 def _unpaired_poses(comparison: Comparison) -> list[str]:
+    """Poses without a partner of each estimate, and of the reference as a range over the estimates."""
     paired = {result.name: result.matched for result in comparison.results.values()}
-    same = grouped(((m.left_out_estimate, m.left_out_reference), name) for name, m in paired.items())
-    return [
-        f"Not paired: {counted(here, 'pose')} of {listed(names)}, {number(there)} of {comparison.reference.name}."
-        for (here, there), names in same.items()
-        if here or there
-    ]
+    there = sorted({m.left_out_reference for m in paired.values()})
+    of = {name: m.left_out_estimate for name, m in paired.items() if m.left_out_estimate}
+    each = [f"{number(n)} of {name}" for name, n in of.items()]
+    if there[-1]:
+        span = number(there[-1]) if there[0] == there[-1] else f"{number(there[0])} to {number(there[-1])}"
+        each.append(f"{span} of {comparison.reference.name}")
+    return [f"Poses that are not paired: {listed(each)}."] if each else []
 
 
 def _undetermined_alignments(comparison: Comparison) -> list[str]:
@@ -152,7 +156,7 @@ def _rough_intervals(comparison: Comparison) -> list[str]:
     names = [r.name for r in comparison.results.values() if not r.statistics["translation"].reliable]
     if not names:
         return []
-    return [f"The intervals of {listed(names)} are rough: fewer than 10 independent blocks fit the trajectory."]
+    return [f"The 95 % intervals of {listed(names)} are rough, from fewer than 10 independent blocks."]
 
 
 def _reported_covariances(comparison: Comparison) -> list[str]:

@@ -8,7 +8,7 @@ from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
 from fgbaseline.data.wording import plural
 
-from ..formatting import grouped, listed, number, per_cent
+from ..formatting import grouped, limit_per_cent, listed, number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,14 +54,16 @@ def causal_estimate(reference: str) -> str:
 
 def sample_requirement() -> str:
     """Sample that `fgbaseline check` requires."""
-    return f"fgbaseline check requires {MIN_SAMPLE_SIZE} over {per_cent(MIN_COVERAGE)}"
+    return f"fgbaseline check requires {MIN_SAMPLE_SIZE} over {limit_per_cent(MIN_COVERAGE)}"
 
 
-def threshold(bound: float) -> str:
-    """Threshold on a distance: 5 m, or 1 % of the path length where that is less."""
-    if bound >= FAR:
-        return f"{bound:g} m (fixed above {FAR / FAR_SHARE:g} m of path length)"
-    return f"{per_cent(FAR_SHARE)} of the path length, {number(bound)} m"
+def threshold(bounds: Iterable[float]) -> str:
+    """Thresholds on distances of one kind: 5 m, or 1 % of the path lengths where that is less."""
+    every = sorted(bounds)
+    if every[0] >= FAR:
+        return f"{every[0]:g} m (fixed above {FAR / FAR_SHARE:g} m of path length)"
+    least, most = number(every[0]), number(every[-1])
+    return f"{limit_per_cent(FAR_SHARE)} of the path length, {least if least == most else f'{least} to {most}'} m"
 
 
 def threshold_sentences(quantity: str, most: Mapping[str, tuple[float, str]], onset: Mapping[str, str]) -> list[str]:
@@ -71,10 +73,11 @@ def threshold_sentences(quantity: str, most: Mapping[str, tuple[float, str]], on
     any.
     """
     sentences = []
-    for text, those in grouped((threshold(bound), name) for name, (bound, _) in most.items()).items():
+    for those in grouped((bound >= FAR, name) for name, (bound, _) in most.items()).values():
         each = listed(f"{name} {most[name][1]}" for name in those)
         beyond = "; ".join(f"{name} {onset[name]}" for name in onset if name in those)
         exceeded = f" Above the threshold: {beyond}." if beyond else ""
+        text = threshold([most[name][0] for name in those])
         sentences.append(f"Maximum {quantity}: {each}; threshold {text}.{exceeded}")
     return sentences
 
@@ -85,7 +88,7 @@ def reference_sigma_sentence(name: str, sigma: Mapping[str, float | None]) -> st
         number(sigma[key]) for key in ("position_rmse", "position_final", "rotation_rmse_deg", "rotation_final_deg")
     )
     return (
-        f"Sigma of {name} itself, with the first pose fixed: position (3D) {along} m RMS, {final} m at the end; "
+        f"Sigma of {name} itself, with its start fixed: position (3D) {along} m RMS, {final} m at the end; "
         f"rotation {turn}° RMS, {final_turn}° at the end."
     )
 

@@ -8,7 +8,18 @@ from fgbaseline.compare import RmseDifference, distance_traveled
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.sample_sizes import coverage
 
-from ..formatting import MINUS, counted, grouped, interval, listed, number, per_cent, resolution, resolved
+from ..formatting import (
+    MINUS,
+    counted,
+    grouped,
+    interval,
+    limit_per_cent,
+    listed,
+    number,
+    per_cent,
+    resolution,
+    resolved,
+)
 from .evidence import causal_estimate, threshold_sentences
 
 NOTABLE_SHARE = 0.05
@@ -116,28 +127,27 @@ def _is_unresolved(result: Result) -> bool:
 
 def error_decompositions(comparison: Comparison) -> list[str]:
     """Shares of heading and scale in the squared position error, where they are notable."""
-    each, others = [], 0
+    sentences, others = [], 0
     for result in comparison.ranked:
         if np.isfinite(result.shares.noise) and not _is_unresolved(result):
             if not any(result.share_intervals.by_name[name][0] >= NOTABLE_SHARE for name in ("heading", "scale")):
                 others += 1
                 continue
-            each.append(
-                f"of {result.name}, {_share(result, 'heading')} is from heading, {_share(result, 'scale')} from scale "
-                f"(least-squares scale {1.0 + 0.01 * result.shares.scale_percent:.4f}) and "
-                f"{per_cent(max(result.shares.noise, 0.0))} from the rest"
+            sentences.append(
+                f"Squared position error of {result.name}: {_share(result, 'scale')} from scale (least-squares scale "
+                f"{1.0 + 0.01 * result.shares.scale_percent:.4f}), {_share(result, 'heading')} from heading, "
+                f"{100.0 * max(result.shares.noise, 0.0):.1f} % from the rest."
             )
-    below = f"heading and scale have less than {per_cent(NOTABLE_SHARE)} each"
     if others:
-        each.append(f"{'of the others ' if each else ''}{below}")
-    return [f"Squared position error: {'; '.join(each)}."] if each else []
+        of, least = "the other estimates" if sentences else "each estimate", limit_per_cent(NOTABLE_SHARE)
+        sentences.append(f"Squared position error of {of}: scale and heading below {least} each.")
+    return sentences
 
 
 def _share(result: Result, name: str) -> str:
-    value, low, high = result.share_intervals.by_name[name]
-    if not np.isfinite(low):
-        return per_cent(max(value, 0.0))
-    return f"{per_cent(max(value, 0.0))} [{number(100.0 * low)}, {number(100.0 * high)}]"
+    value, low, high = (100.0 * share for share in result.share_intervals.by_name[name])
+    bounds = f" [{max(low, 0.0):.1f}, {high:.1f}]" if np.isfinite(low) else ""
+    return f"{max(value, 0.0):.1f} %{bounds}"
 
 
 def path_lengths(comparison: Comparison) -> list[str]:
@@ -148,6 +158,6 @@ def path_lengths(comparison: Comparison) -> list[str]:
         own = float(distance_traveled(matched.estimate.position)[-1]) / float(matched.alignment.scale)
         path = float(distance_traveled(matched.reference.position)[-1])
         if path > 0.0 and number(own) != number(path):
-            share = f"{number(100.0 * abs(own / path - 1.0))} % {'longer' if own > path else 'shorter'}"
+            share = f"{per_cent(abs(own / path - 1.0))} {'longer' if own > path else 'shorter'}"
             each.append(f"{result.name} {number(own)} m, {share}")
-    return [f"Path length over the paired poses against the reference's: {'; '.join(each)}."] if each else []
+    return [f"Path length over the paired poses, compared with the reference's: {'; '.join(each)}."] if each else []

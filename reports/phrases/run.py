@@ -24,6 +24,7 @@ from fgbaseline.compare.divergence_onset import (
 from fgbaseline.compare.estimate_comparison import Run, known, same_frames
 from fgbaseline.compare.sample_sizes import insufficient_truth, truth_sample
 from fgbaseline.data import Status
+from fgbaseline.data.wording import noun
 
 from ..formatting import counted, distance, grouped, listed, number, per_cent
 from ..results.evidence import frame_ranges, summarize_sigma
@@ -35,7 +36,7 @@ from .evidence import (
     sample_requirement,
     threshold_sentences,
 )
-from .run_accuracy import ate_sentences, divergence_sentences, overconfidence_sentences
+from .run_accuracy import ate_sentences, divergence_sentences, overconfidence_sentences, reference_nees_sentences
 
 SUSPECTED = "wrong matches, moving points or points that cannot be triangulated"
 """reasons of `WRONG_MATCH`"""
@@ -57,6 +58,7 @@ def verdict(run: Run) -> list[str]:
         partial(_with_status, Status.RECOVERED),  # the table marks them, and their loss shows in the ranking
         _maximum_divergence,
         _missing_poses,
+        reference_nees_sentences,
         _consistency,
         _invalid_covariances,
         _held_out,
@@ -141,8 +143,8 @@ def _maximum_divergence(run: Run) -> list[str]:
     if wrong and overall is not None:
         each = listed(f"{per_cent(share)} ({name})" for name, share in wrong.items())
         sentences.append(
-            f"Within {AROUND:g} s of the first frame above the threshold the mask excluded {each} of the observations "
-            f"as {SUSPECTED}; {per_cent(overall)} in the whole recording."
+            f"Share of the observations that the mask excluded as {SUSPECTED}, within {AROUND:g} s of the first frame "
+            f"above the threshold: {each}; in the whole recording {per_cent(overall)}."
         )
     return sentences
 
@@ -179,14 +181,18 @@ def _consistency(run: Run) -> list[str]:
 
 
 def _invalid_covariances(run: Run) -> list[str]:
-    each = []
+    found = []
     for result in run.answered:
         bad = np.flatnonzero(result.evidence.covariance == CovarianceState.NOT_POSITIVE_DEFINITE)
         if len(bad):
             where = frame_ranges(bad)
             if len(where) > LONGEST_LIST:
                 where = f"first {bad[0]}, last {bad[-1]}"
-            each.append(f"{number(len(bad))} of {result.name} ({'frame' if len(bad) == 1 else 'frames'} {where})")
+            found.append(((len(bad), f"{noun(len(bad), 'frame')} {where}"), result.name))
+    each = [
+        f"{number(n)} {f'of {names[0]}' if len(names) == 1 else f'each of {listed(names)}'} ({where})"
+        for (n, where), names in grouped(found).items()
+    ]
     return [f"Pose covariances that are not positive definite, which NEES leaves out: {listed(each)}."] if each else []
 
 

@@ -57,7 +57,7 @@ def ate_sentences(run: Run) -> list[str]:
         return [f"There is no ATE: no estimator has a pose where the ground truth ({source}, {coverage}) has one."]
     each = listed(f"{resolved(rmse[name], ate_resolution(run))} m for {name}" for name in known)
     alignment = "SE(3) alignment" if run.problem.imu is None else "alignment in yaw and position"
-    sentences = [f"ATE (RMSE after {alignment} to the ground truth, {source}, {coverage}): {each}."]
+    sentences = [f"ATE (RMSE to the ground truth {source}, after {alignment}, over {coverage}): {each}."]
     if run.reference not in known:
         return sentences
     errors = {name: tables[name]["position"].to_numpy() for name in known if run.results[name].ate_common is not None}
@@ -154,10 +154,10 @@ def _closeness(run: Run, found: PairedRanking) -> list[str]:
     sigma = run.results[str(run.reference)].evidence.sigma.position_rmse
     if not max(found.rmse.values()) < WITHIN_SIGMAS * sigma:
         return []
-    solved = f" Trusted means that {run.reference} solves this problem well, not that its error is below its sigma."
+    solved = f" Trusted means that {run.reference} solves this problem well, not that it is close to the truth."
     return [
         f"The divergences (RMSE) of {listed(found.rmse)} are below {WITHIN_SIGMAS:g} times the position sigma of "
-        f"{run.reference} itself, {number(sigma)} m RMS: the ranking shows which is closer to {run.reference}, not "
+        f"{run.reference}, {number(sigma)} m RMS: the ranking shows which is closer to {run.reference}, not "
         f"which is closer to the truth.{solved if run.trust.verdict is Verdict.TRUSTED else ''}"
     ]
 
@@ -172,17 +172,19 @@ def _uncertain(differences: Mapping[tuple[str, str], RmseDifference]) -> str:
     unreliable = {names: d for names, d in differences.items() if not d.reliable}
     if not unreliable:
         return ""
-    why = "as the errors stay correlated over much of the recording"
+    why = "the errors stay correlated over much of the recording"
     if len(unreliable) > FEW:
         blocks = plural(min(int(d.blocks) for d in unreliable.values()), "block")
         n = len(unreliable)
-        return f" The 95 % intervals of {n} of these differences are uncertain, {why}: they rest on {blocks}."
+        return f" The 95 % intervals of {n} of these differences are rough, from {blocks}: {why}."
     each = [
-        f"{larger} is {number(d.value)} m [{number(d.low)}, {number(d.high)}] above {smaller}, from "
-        f"{plural(int(d.blocks), 'block')}"
+        f"{number(d.value)} m [{number(d.low)}, {number(d.high)}] ({larger} above {smaller}, "
+        f"{plural(int(d.blocks), 'block')})"
         for (larger, smaller), d in unreliable.items()
     ]
-    return f" The 95 % interval of the difference is uncertain, {why}: {listed(each)}."
+    title = "The difference is" if len(each) == 1 else "The differences are"
+    interval = "Its 95 % interval is" if len(each) == 1 else "Their 95 % intervals are"
+    return f" {title} {listed(each)}. {interval} rough: {why}."
 
 
 def _over(run: Run, found: PairedRanking) -> str:
@@ -231,15 +233,36 @@ def _is_inconsistent(result: Result) -> bool:
     return result.nees is not None and _median(result.nees) > overconfidence_bound()
 
 
+def reference_nees_sentences(run: Run) -> list[str]:
+    """Estimators whose median reference NEES exceeds the bound of one pose although their sigma covers the divergence.
+
+    They are not called overconfident, since their position sigma is not below their RMSE.
+    """
+    medians = {}
+    for result in run.answered:
+        difference = None if result.name in run.unranked else result.evidence.difference
+        if difference is None or is_overconfident(run, result) or 2 * difference.left_out.sum() > run.problem.n_frames:
+            continue
+        medians[result.name] = _median(difference.nees)
+    each = [f"{name} {number(nees)}" for name, nees in medians.items() if nees > overconfidence_bound()]
+    if not each:
+        return []
+    small = "Its pose covariance is" if len(each) == 1 else "Their pose covariances are"
+    return [
+        f"Median reference NEES above {number(overconfidence_bound())} (97.5 % quantile of one pose), though the "
+        f"position sigma is not below the RMSE: {listed(each)}. {small} too small in single directions or in rotation."
+    ]
+
+
 def _claim(run: Run, result: Result) -> str:
     distance, other = _actual(run, result)
     ratio, difference = result.evidence.sigma_ratio, result.evidence.difference
     if difference is not None and difference.is_overconfident:
         difference = None  # its NEES is that of the few frames in which P - P_ref is positive definite
     figures = {
-        "median NEES": float("nan") if result.nees is None else _median(result.nees),
+        "median NEES of the pose": float("nan") if result.nees is None else _median(result.nees),
         "median reference NEES": float("nan") if difference is None else _median(difference.nees),
-        "median sigma ratio": float("nan") if ratio is None else float(ratio["position"].median()),
+        f"median sigma ratio to {run.reference}": float("nan") if ratio is None else float(ratio["position"].median()),
     }
     known = ", ".join(f"{name} {number(value)}" for name, value in figures.items() if np.isfinite(value))
     measured = f"; {known}" if known else ""

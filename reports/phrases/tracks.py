@@ -7,7 +7,7 @@ from fgbaseline.data import Sequence
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
-from ..formatting import listed, number, per_cent
+from ..formatting import limit_per_cent, listed, number
 
 SPARSE = 0.25
 """part of an even share of the observations, below which a cell of the 3 x 3 grid is sparse"""
@@ -37,5 +37,5 @@ def _sparse(pixel: FloatArray, size: tuple[float, float], image: str) -> str:
     cell = np.clip((3.0 * pixel / ends).astype(np.int64), 0, 2)
     share = np.bincount(3 * cell[:, 1] + cell[:, 0], minlength=9) / len(pixel)
     places = [f"{REGION_ROWS[k // 3]} {REGION_COLUMNS[k % 3]}" for k in np.flatnonzero(share < SPARSE / 9.0)]
-    few = f"below {per_cent(SPARSE)} of an even share"
+    few = f"below {limit_per_cent(SPARSE)} of an even share"
     return f"Sparse cells of the 3 x 3 grid of the {image} ({few}): {listed(places) or 'none'}."

@@ -10,7 +10,7 @@ import numpy as np
 from fgbaseline.data import Status
 from fgbaseline.data.wording import plural
 
-from ..formatting import meters, per_cent, pixels
+from ..formatting import limit_per_cent, meters, per_cent, pixels
 from .experiments import Outcome, Staged, Study, path_length
 from .recordings import PAPER_RECORDINGS, PaperRecording
 
@@ -224,7 +224,7 @@ def _every_noise(study: Study) -> Claim:
         "singularity error for different numbers of features and every noise level",
         verdict,
         f"the printed equations fail in {failing} of {len(runs)} settings; in {off} more the trajectory is over "
-        f"{per_cent(MAX_DISTANCE)} of its length from dead reckoning",
+        f"{limit_per_cent(MAX_DISTANCE)} of its length from dead reckoning",
         "landmarks cross the camera plane: " + causes(study, lambda s: s.outcome.apart_rmse, meters),
         f"they fail in {sum(run.breaks for run in repaired)} of {len(repaired)} settings" if repaired else "",
     )

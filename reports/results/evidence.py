@@ -115,7 +115,7 @@ class HeldOutError(Part):
 
 
 REFERENCE = "it is the reference"
-SAME_GRAPH = "same graph as the reference's: P − P_ref is zero up to rounding"
+SAME_GRAPH = "it solves the graph of the reference: P − P_ref is zero up to rounding"
 
 
 def summarize_evidence(run: Run, result: Result) -> dict[str, Any]:

@@ -67,10 +67,10 @@ VELOCITY_AND_BIASES = tuple(metric for quantity, unit in UNITS.items() for metri
 STATE_NEES = Metric(
     ("nees_state", "median"),
     glossary.CONSISTENCY,
-    "NEES of 15",
+    "state NEES, median (14.3 expected)",
     tables=MAIN | TERMINAL,
     term=glossary.STATE_NEES,
-    brief="NEES of 15",
+    brief="state NEES (14.3 expected)",
 )
 BLOCK_NEES = (
     Metric(("nees_state", "mean"), glossary.STATE_NEES, "mean", tables=EVIDENCE),

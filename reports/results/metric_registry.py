@@ -101,7 +101,7 @@ METRICS = (
         brief="claimed sigma (3D)",
     ),
     Metric(("sigma", "position_final"), glossary.SIGMA, "claimed, final", "m", tables=EVIDENCE),
-    Metric(("sigma_ratio", "position"), glossary.CONSISTENCY, "sigma ratio", tables=MAIN, term="sigma ratio"),
+    Metric(("sigma_ratio", "position"), glossary.SIGMA, "ratio to reference", tables=MAIN, term="sigma ratio"),
     Metric(("nees", "median"), glossary.CONSISTENCY, "NEES, median (5.35 expected)", tables=MAIN, term=glossary.NEES),
     STATE_NEES,
     Metric(

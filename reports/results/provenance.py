@@ -38,7 +38,7 @@ def creation() -> dict[str, dict[str, str | int]]:
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     now = datetime.now().astimezone() if epoch is None else datetime.fromtimestamp(int(epoch), UTC)
     made = {"date": now.strftime("%Y-%m-%d %H:%M:%S %z"), "command line": _command_line()}
-    return {"Made": {**made}, "Versions": {**versions()}, "Machine": machine()}
+    return {"Created": {**made}, "Versions": {**versions()}, "Machine": machine()}
 
 
 def _command_line() -> str:

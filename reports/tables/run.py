@@ -22,8 +22,8 @@ from .table import Cell, Column, Row, Table, best
 OVERCONFIDENT = "overconfident"
 """in place of a reference NEES, for which P - P_ref has to be positive definite"""
 NOT_POSITIVE_DEFINITE = (
-    "in most frames P − P_ref is not positive definite: the covariance P that it claims is below P_ref, that of the "
-    "reference"
+    "in most frames P_ref exceeds 1.1 P in some direction, although the reference uses at least the same data (P: its "
+    "covariance; P_ref: that of the reference)"
 )
 NOT_DEFINED = "P − P_ref is not positive definite in the others"
 Estimators = Mapping[str, Mapping[str, Any]]
@@ -39,7 +39,7 @@ def main_table(run: Run, estimators: Estimators) -> Table:
         return table
     caption = (
         f"Best of a column in bold; equal printed values are all bold.{_unranked(run)} Reprojection errors are "
-        "over all observations of an estimator's landmarks, also those that the mask excludes as copied or wrong. "
+        "over all observations of an estimator's landmarks, including those that the mask excludes as copied or wrong. "
         "Common observations are those that every estimator with landmark updates used."
     )
     return replace(table, caption=caption)

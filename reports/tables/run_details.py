@@ -13,7 +13,7 @@ from fgbaseline.compare.reference_trust import SHARE
 from fgbaseline.data import Estimate, Event
 from fgbaseline.data.finding import Finding
 
-from ..formatting import NO_BREAK, RESOLUTION, counted, grouped, number, per_cent, quantity, resolved
+from ..formatting import NO_BREAK, RESOLUTION, counted, grouped, limit_per_cent, number, per_cent, quantity, resolved
 from ..results.json_files import at
 from .table import Cell, Column, Row, Table, numbers, words
 
@@ -26,7 +26,7 @@ REASONS: Mapping[str, str] = {
     "disparity": "disparity too small to determine the depth",
     "rows": "rows in the left and right image disagree",
     "prediction": "contradicts the motion of its track (wrong match)",
-    "short": "rest of the track too short for a check",
+    "short": "remaining track too short to check",
     "geometry": "point not determined, or behind a camera",
     "moving": "point moved",
     "copied": "copied from the previous frame",
@@ -39,11 +39,11 @@ REPAIR = ("without repair", "with repair and mask")
 CONDITIONS: Mapping[str, str] = {
     **dict.fromkeys(
         ("angular_axes", "linear_axes"),
-        "Axes: without any repair of the velocities, and with that of their axes alone.",
+        "Axes: the first value is without any repair of the velocities, the second with that of the axes alone.",
     ),
     **dict.fromkeys(
         ("gyro_bias", "time_offset"),
-        "Bias and time offset: without and with this repair, the others of the angular velocity applied.",
+        "Bias and time offset: all other repairs of the angular velocity are applied to both values.",
     ),
 }
 """codes of findings -> sentence on the other repairs that are applied where they are measured"""
@@ -53,10 +53,12 @@ def trust_table(criteria: Iterable[Criterion]) -> Table:
     """Criteria of the trust in the reference: measured value, limits and verdict."""
     rows = []
     for c in criteria:
-        text, sign = per_cent if c.unit == SHARE else number, "≥" if c.at_least else "≤"
+        text, of_limit = (per_cent, limit_per_cent) if c.unit == SHARE else (number, "{:g}".format)
+        sign = "≥" if c.at_least else "≤"
         name = f"{c.name}, {c.unit}" if c.unit not in ("", SHARE) else c.name
         limits = (
-            f"{'=' if limit == 0.0 and not c.at_least else sign} {text(limit)}" for limit in (c.doubtful, c.untrusted)
+            f"{'=' if limit == 0.0 and not c.at_least else sign} {of_limit(limit)}"
+            for limit in (c.doubtful, c.untrusted)
         )
         rows.append(Row.of(name, text(c.value), *limits, c.verdict.name.lower(), c.remark))
     columns = (*numbers("measured", "trusted if", "doubtful if"), *words("verdict", "remark"))
@@ -88,7 +90,7 @@ def _residuals(run: Run) -> Table:
     """Reprojection errors in classes."""
     tables = {r.name: r.evidence.patterns for r in run.answered}
     columns = {"observations": "n", "median, px": "median", "mean, px": "mean", "95th percentile, px": "p95"}
-    title = "Reprojection errors by distance, track age, place in the image and camera"
+    title = "Reprojection errors by distance, track age, image region and camera"
     return _frames(
         title,
         tables,
@@ -101,7 +103,7 @@ def _map(run: Run) -> Table:
     """Distances of landmarks from the reference's, by depth."""
     tables = {r.name: table for r in run.answered if (table := r.evidence.map_by_depth) is not None}
     columns = {"landmarks": "n", "distance, m": "distance", "in the camera frame, m": "seen", "sigmas": "sigmas"}
-    return _frames("Landmarks beside the reference's, medians by depth", tables, {"depth": "depth"}, columns)
+    return _frames("Map difference from the reference by depth (medians)", tables, {"depth": "depth"}, columns)
 
 
 def _moved(run: Run) -> Table:
@@ -112,8 +114,8 @@ def _moved(run: Run) -> Table:
     moved = table[table["moved"]].sort_values("gain", ascending=False)
     more = f", the clearest {MAX_DYNAMIC}" if len(moved) > MAX_DYNAMIC else ""
     title = (
-        f"{counted(len(moved), 'used track')} better explained by a point of constant velocity than by a fixed one, by "
-        f"the residuals of {run.reference}{more}"
+        f"{counted(len(moved), 'used track')} that a point of constant velocity fits significantly better than a fixed "
+        f"one (residuals of {run.reference}{more})"
     )
     rows = tuple(
         Row(str(row["landmark"]), _numbers(int(row["n"]), row["speed"], row["squared"], row["gain"]))
@@ -134,9 +136,9 @@ def components_table(estimators: Mapping[str, Mapping[str, Any]]) -> Table:
     )
     columns = tuple(Column(title, row, "px") for row in seen or PIXEL_ROWS for title in ("median", "1.4826 MAD"))
     caption = (
-        "Measured minus predicted, over all observations of an estimator's landmarks, also those that the mask "
-        "excludes. 1.4826 times the "
-        "median absolute deviation (MAD) is the sigma of Gaussian residuals; outliers do not change it."
+        "Measured minus predicted, over all observations of an estimator's landmarks, including those that the mask "
+        "excludes. 1.4826 times the median absolute deviation (MAD) is the sigma of Gaussian residuals; a few outliers "
+        "hardly change it."
     )
     return Table(columns, rows, caption=caption)
 
@@ -150,7 +152,7 @@ def exclusions_table(summary: Mapping[str, Any]) -> Table:
         for reason, count in sorted(counts.items(), key=lambda item: -item[1])
         if count
     )
-    caption = "Decided once for all estimators, before any of them runs."
+    caption = "The mask is the same for all estimators and is made before any of them runs."
     return Table(numbers("observations", "of all"), rows, name="reason for exclusion", caption=caption)
 
 

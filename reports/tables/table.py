@@ -98,11 +98,12 @@ class Table:
 
     @property
     def groups(self) -> list[tuple[str, int, str]]:
-        """Title of each group of columns, how many it spans, and their common term; empty where none has a title."""
+        """Title of each group of columns, how many it spans, and its term; empty where none has a title."""
         spans = [(group, list(columns)) for group, columns in groupby(self.columns, key=lambda column: column.group)]
         if not any(group for group, _ in spans):
             return []
-        return [(g, len(of), of[0].term if len({c.term for c in of}) == 1 else "") for g, of in spans]
+        shared = {g: len({c.term for c in of}) == 1 and g.startswith(of[0].term) for g, of in spans}
+        return [(g, len(of), of[0].term if shared[g] else "") for g, of in spans]
 
     def own_term(self, column: Column) -> str:
         """Term that the heading of a column links to; empty where that of its group does."""

@@ -134,11 +134,15 @@ def _minima(
 
 def _costs(minima: list[LocalMinimum], last: int, *, both: bool) -> Event:
     """Event with the costs from all starts."""
-    costs = " and ".join(f"{minimum.cost:,.8g} with a start at {minimum.start}" for minimum in minima)
+    costs = " and ".join(f"{minimum.cost:,.8g} from a start at {minimum.start}" for minimum in minima)
     if not both:
         return Event(last, EventKind.STARTED_AT_ISAM2, f"the final cost is {costs}")
     if len(minima) == 1:
-        return Event(last, EventKind.ONE_START, f"the cost is {costs}: nothing says that it is the lowest")
+        return Event(
+            last,
+            EventKind.ONE_START,
+            f"the final cost is {costs}; a second start failed",
+        )
     low, high = sorted(minimum.cost for minimum in minima)
     share = high / low - 1.0 if low > 0 else float("inf")
     one, other = (poses_from_values(minimum.values, range(last + 1))[:, :3, 3] for minimum in minima)

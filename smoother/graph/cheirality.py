@@ -10,7 +10,7 @@ from fgbaseline.geometry import Camera, FloatArray
 MIN_DISPARITY = 0.05
 """px; a landmark with a smaller disparity makes a system indeterminate, as does one at the plane of a camera that
 observed it (unbounded Jacobian) or behind it (zero Jacobian)."""
-CHEIRALITY_VIOLATION = "it came to lie behind a camera that saw it, at its plane or at infinity"
+CHEIRALITY_VIOLATION = "it violates cheirality: at infinity, or not in front of every camera that observes it"
 
 
 def cheirality_violations(

@@ -133,5 +133,5 @@ def _marginals(
 
 
 def _never_determined(smoother: IncrementalSmoother) -> list[Event]:
-    kind, why = EventKind.LANDMARK_NEVER_DETERMINED, "its observations never fixed its position well enough"
+    kind, why = EventKind.LANDMARK_NEVER_DETERMINED, "its observations never determined its position"
     return [Event(frame, kind, why, landmark) for landmark, frame in smoother.builder.uninitialized.last_seen()]

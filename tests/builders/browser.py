@@ -73,7 +73,7 @@ class Opened:
 
     def unfold_values(self) -> None:
         """Opens the charts' values as a table, which a later task of the browser fills: `toggle` is queued."""
-        self.page.click("summary:has-text('in numbers')")
+        self.page.click("summary:has-text('Values of all charts')")
         self.page.wait_for_selector("#values td:not(:empty)")
 
     def set_frame(self, frame: int) -> None:

@@ -140,14 +140,14 @@ def test_classes_hold_every_observation_once_and_show_where_a_bias_is() -> None:
     patterns = compare.residual_patterns(problem.sequence, table)
     for _, classes in patterns.groupby("by"):
         assert classes["n"].sum() in (len(o), 2 * len(o))
-    by_region = patterns[patterns["by"] == "region"].set_index("of")["v"]
+    by_region = patterns[patterns["by"] == "image region"].set_index("of")["v"]
     assert by_region.filter(like="right").mean() == pytest.approx(2.0, abs=0.2)
     assert by_region.drop(by_region.filter(like="right").index).abs().max() < 0.3
     ages = patterns[patterns["by"] == "track age"].set_index("of")["n"]
     assert ages.to_dict() == {
         name: n * SCENE.n_points for name, n in {"1": 1, "2 to 3": 2, "4 to 6": 3, "7 to 12": 6, "13 to 25": 4}.items()
     }
-    sides = patterns[patterns["by"] == "side"].set_index("of")
+    sides = patterns[patterns["by"] == "camera"].set_index("of")
     assert sides.loc["left camera", "median"] == pytest.approx(sides.loc["right camera", "median"], rel=0.2)
 
 
@@ -235,15 +235,15 @@ def test_residual_patterns_of_a_known_case() -> None:
     found = compare.residual_patterns(recording(), table)
     assert found.columns.tolist() == ["by", "of", "n", "median", "mean", "p95", "u", "v"]
     assert found.index.tolist() == list(range(len(found)))
-    assert found["by"].drop_duplicates().tolist() == ["distance", "track age", "region", "side"]
+    assert found["by"].drop_duplicates().tolist() == ["distance", "track age", "image region", "camera"]
     each = len(table) // 6
     by_depth = found[found["by"] == "distance"]
     assert list(zip(by_depth["of"], by_depth["n"], strict=True)) == [
         (name, each) for name in ("0 to 5 m", "5 to 10 m", "40 to 80 m", "80 m and more")
     ]
-    both = found[found["by"] != "side"][["median", "mean", "p95", "u", "v"]].to_numpy()
+    both = found[found["by"] != "camera"][["median", "mean", "p95", "u", "v"]].to_numpy()
     np.testing.assert_allclose(both, np.tile([7.0, 7.0, 7.0, 4.5, 6.0], (len(both), 1)))
-    sides = found[found["by"] == "side"]
+    sides = found[found["by"] == "camera"]
     assert sides["of"].tolist() == ["left camera", "right camera"]
     np.testing.assert_allclose(sides[["median", "mean", "p95", "u", "v"]], [[5, 5, 5, 3, 4], [10, 10, 10, 6, 8]])
     assert sides["n"].tolist() == [len(table)] * 2
@@ -254,7 +254,7 @@ def test_the_outermost_observations_are_in_the_outermost_regions() -> None:
     for column, (lowest, highest) in enumerate((("left", "right"), ("top", "bottom"))):
         for row, name in ((np.argmin(pixel[:, column]), lowest), (np.argmax(pixel[:, column]), highest)):
             found = compare.residual_patterns(recording(), table.iloc[[row]])
-            assert name in found.loc[found["by"] == "region", "of"].item().split()
+            assert name in found.loc[found["by"] == "image region", "of"].item().split()
     nothing = compare.residual_patterns(replace(recording(), observations=data.Observations.none()), table.iloc[:0])
     assert len(nothing) == 0
 

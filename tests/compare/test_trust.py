@@ -15,6 +15,7 @@ from fgbaseline.compare.residuals.noise_scale import expected_square, motion_sca
 from fgbaseline.data import Estimate, Event, Problem, Status
 from fgbaseline.data.triangulate_landmarks import landmarks_along
 from fgbaseline.data.velocity_increments import Shift
+from fgbaseline.data.wording import number, per_cent
 from fgbaseline.geometry import disparity
 from fgbaseline.smoother.batch.full_graph import full_graph
 from fgbaseline.smoother.graph.gtsam_conversions import values_from_state
@@ -62,7 +63,7 @@ def test_the_pixel_scale_is_that_of_the_noise_within_a_tenth(
     estimate = smoother.isam2(problem)
     found = pixel_scale(problem, estimate)
     assert found == pytest.approx(scale, rel=0.1)
-    said = f"normalized pixel residual RMS {found:.2g} (limit 1.6; 1 is expected)"
+    said = f"normalized pixel residual RMS {number(found)} (limit 1.6; 1 is expected)"
     assert said in compare.trust(problem, estimate).reasons
 
 
@@ -274,12 +275,10 @@ def test_intervals_without_common_landmarks_are_reported() -> None:
     problem = plain_problem(Scene().sequence())
     answer = true_answer(problem)
     frame = problem.sequence.observations.frame
-    said = (
-        "have no used landmark in common; there only the velocities constrain the motion, and a jump would go unnoticed"
-    )
+    said = "have no used landmark in common; there only the velocities constrain the motion"
     for seen, untied in ((3, 7), (8, 2), (10, 0)):
         reasons = compare.trust(problem, replace(answer, used=answer.used & (frame < seen))).reasons
-        pairs = f"{untied} of 9 pairs of consecutive frames ({100 * untied / 9:.3g} %)"
+        pairs = f"{untied} of 9 pairs of consecutive frames ({per_cent(untied / 9)})"
         assert (f"{pairs} {said}" in reasons) == (untied > 0)
         assert any("no used landmark in common" in reason for reason in reasons) == (untied > 0)
     limits = TrustLimits(*[(np.inf, np.inf)] * 2, (0.0, 0.0), (1.0, 1.0), given_up_frames=(1.0, 1.0))
@@ -294,14 +293,12 @@ def test_the_reasons_of_trust_state_their_figures() -> None:
     problem = clean()
     pixel, motion = pixel_scale(problem, reference()), motion_scale(problem, reference())
     n = reference().used.sum()
-    of_recorded, of_unmasked = (
-        f"{100 * n / whole.sum():.3g} %" for whole in (expected_observations(problem), problem.mask)
-    )
+    of_recorded, of_unmasked = (per_cent(n / whole.sum()) for whole in (expected_observations(problem), problem.mask))
     assert set(compare.trust(problem, reference()).reasons) == {
-        f"normalized pixel residual RMS {pixel:.2g} (limit 1.6; 1 is expected)",
-        f"normalized motion residual RMS {motion:.2g} (limit 1.4; up to 1 is expected)",
-        f"it used {n:,} observations: {of_recorded} of the recorded ones except far points (disparity of 0 to 1 px), "
-        f"{of_unmasked} of the unmasked ones",
+        f"normalized pixel residual RMS {number(pixel)} (limit 1.6; 1 is expected)",
+        f"normalized motion residual RMS {number(motion)} (limit 1.4; at most 1 is expected)",
+        f"{reference().name} used {n:,} observations: {of_recorded} of the recorded ones except far points (disparity "
+        f"of 0 to 1 px), {of_unmasked} of the unmasked ones",
         "the recording was not diagnosed: its noise is assumed",
         "not compared with a batch solution",
     }

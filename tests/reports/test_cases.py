@@ -57,8 +57,11 @@ RIGHT: dict[str, tuple[tuple[str, ...], dict[str, Any], dict[str, float]]] = {
 
 SAID: dict[str, tuple[tuple[str, ...], str]] = {
     "01-tum-fr2-desk": (("gt.txt", "est.txt"), "gt: 1 of 4,500 lines repeats the time stamp before"),
-    "03-orbslam3-ns": (("gt.csv", "f_mono.txt"), "f_mono: its time stamps are in nanoseconds and are divided by"),
-    "06-okvis2": (("gt.csv", "okvis2_nohead.csv"), "its quaternions are read as x y z w: so its rotations fit to"),
+    "03-orbslam3-ns": (("gt.csv", "f_mono.txt"), "f_mono: its time stamps are in nanoseconds and"),
+    "06-okvis2": (
+        ("gt.csv", "okvis2_nohead.csv"),
+        "its quaternions are read as x y z w: the median misfit",
+    ),
     "11-position-only": (("gt_idq.txt", "est.tum"), "gt_idq: all its orientations are the same"),
     "14-body-rotation": (("gt.tum", "est.tum"), "est: its body is turned by a constant 119.9°"),
     "14-body-rotation, JPL": (("gt.tum", "est_jpl.tum"), "its quaternions are conjugated, as in JPL's convention"),

@@ -20,7 +20,7 @@ def test_a_count_of_one_has_a_singular() -> None:
 
 def test_a_share_that_is_nearly_nothing_is_not_printed_in_full() -> None:
     shares = (0.0, 1.17e-7, -1.17e-7, 3.5e-5, 0.12345, float("nan"))
-    assert list(map(per_cent, shares)) == ["0 %", "below 0.001 %", "below 0.001 %", "0.0035 %", "12.3 %", "–"]
+    assert list(map(per_cent, shares)) == ["0 %", "below 0.001 %", "below 0.001 %", "0.00350 %", "12.3 %", "–"]
 
 
 def path(n: int = 200, scale: float = 1.0) -> data.Trajectory:

@@ -98,6 +98,23 @@ def test_divergence_panels_hold_the_columns_of_the_comparison() -> None:
         assert not lines(axes, "isam2 (reference)")
 
 
+def test_dotted_lines_are_in_the_picture_real_time_and_the_sigma_ratio_of_one() -> None:
+    problem = plain_problem(scene())
+    T = problem.n_frames
+    fast = np.full(T, 1e-5)  # s, far below the interval between frames
+    loose, tight = (np.tile(v * np.eye(6), (T, 1, 1)) for v in (4.0, 1.0))
+    answers = [answer(problem, name, seconds=fast, covariance=P) for name, P in (("ekf", loose), ("isam2", tight))]
+    some = drawn(run_of(problem, *answers), "time_per_frame", "consistency")
+    interval = 1e3 * float(np.median(problem.sequence.dt))
+    ratios = [axes for axes in some["consistency"].axes if "sigma ratio" in axes.get_ylabel()]
+    assert len(ratios) == 2
+    for axes, level in ((some["time_per_frame"].axes[0], interval), *((axes, 1.0) for axes in ratios)):
+        (dotted,) = (line for line in axes.get_lines() if line.get_linestyle() == ":")
+        assert list(dotted.get_ydata()) == pytest.approx([level, level])
+        low, high = axes.get_ylim()
+        assert low < level < high
+
+
 def test_the_reference_is_included_where_errors_are_those_to_the_truth() -> None:
     run = standard_run()
     table = run.results["isam2"].truth

@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.reports import figures
+from fgbaseline.reports.figures.legend import title_and_legend
 from fgbaseline.reports.figures.run import draw_for_paper
 from fgbaseline.reports.figures.run_data import of_folder
-from fgbaseline.reports.figures.style import PAPER, in_style, label
+from fgbaseline.reports.figures.style import PAPER, SCREEN, in_style, label
 from fgbaseline.reports.run.folder import write_numbers
 
 from ..builders.runs import answer, run_of, scene
@@ -45,6 +46,20 @@ def ten() -> Run:
 @cache
 def drawn_ten() -> dict[str, Figure]:
     return figures.draw(ten())
+
+
+def test_a_title_wider_than_the_sheet_has_several_lines() -> None:
+    names = ", ".join(f"{name} 0.285 m" for name in NAMES)
+    title = f"Errors against MH_05_difficult, SE(3)-aligned (RMSE: {names})"
+    with in_style():
+        figure = Figure(figsize=(SCREEN.width, 3.0))
+        lines = figure.subplots().plot([0.0, 1.0], label="ekf")
+        title_and_legend(figure, title, lines)
+        FigureCanvasAgg(figure).draw()
+    assert figure.get_label() == title
+    box = figure.legends[0].get_title().get_window_extent()
+    assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width
+    assert figure.axes[0].bbox.height > 0.4 * figure.bbox.height
 
 
 def assert_legend_is_whole(name: str, figure: Figure) -> None:
@@ -91,7 +106,7 @@ def test_estimators_with_the_same_map_of_the_image_are_side_by_side() -> None:
     titles = [axes.get_title(loc="left") for axes in figure.axes if axes.get_visible()]
     assert titles == [label(name, "isam2") for name in NAMES]
     table = ten().results["ekf"].evidence.patterns
-    regions = table[table["by"] == "region"].set_index("of")["median"]
+    regions = table[table["by"] == "image region"].set_index("of")["median"]
     shown = figure.axes[1].images[0].get_array()
     assert shown is not None
     for row, vertical in enumerate(("top", "middle", "bottom")):

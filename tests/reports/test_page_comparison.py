@@ -220,7 +220,7 @@ def test_the_command_line_of_a_page_can_be_given_again(
     record = records((tmp_path / "out/report.html").read_text())
     line = record["command line"].replace("&#39;", "'")
     assert line == "fgbaseline compare truth.tum 'my path.tum' --align none --out out"
-    assert "command line" in creation()["Made"]
+    assert "command line" in creation()["Created"]
 
 
 def test_heading_and_scale_are_in_a_sentence_only_where_they_explain_the_error() -> None:
@@ -229,8 +229,8 @@ def test_heading_and_scale_are_in_a_sentence_only_where_they_explain_the_error()
     shaken[:, :3, 3] += np.random.default_rng(0).normal(0.0, 0.1, (len(t), 3))
     scaled[:, :3, 3] *= 1.05
     estimates = (Trajectory(t, shaken, "shaken"), Trajectory(t, scaled, "scaled"))
-    (text,) = (s for s in compare(truth(), *estimates, align="yaw").verdict if s.startswith("Squared position error"))
-    assert "of scaled" in text
-    assert "(least-squares scale 1.0500)" in text
-    assert text.endswith("of the others heading and scale have less than 5 % each.")
-    assert "shaken" not in text
+    sentences = compare(truth(), *estimates, align="yaw").verdict
+    scaled_text, others = (s for s in sentences if s.startswith("Squared position error"))
+    assert scaled_text.startswith("Squared position error of scaled: ")
+    assert " from scale (least-squares scale 1.0500), " in scaled_text
+    assert others == "Squared position error of the other estimates: scale and heading below 5 % each."

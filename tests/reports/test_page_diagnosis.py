@@ -35,10 +35,10 @@ def test_findings_stand_with_their_figures_and_repairs_below() -> None:
     assert ">median difference of the angular velocity from visual odometry</td>" in html
     assert "<td>0.0271\N{NO-BREAK SPACE}rad/s</td><td>0.0201\N{NO-BREAK SPACE}rad/s</td>" in html
     assert ">observations</td><td>6,562</td><td>0</td>" in html
-    assert "<td>41.2 %</td><td>0.2 %</td>" in html
+    assert "<td>41.2 %</td><td>0.200 %</td>" in html
     assert "standard error 0.001 rad/s" in html
     assert "counted" not in html
-    assert "Bias and time offset: without and with this repair, the others of the angular velocity applied." in html
+    assert "Bias and time offset: all other repairs of the angular velocity are applied to both values." in html
     assert "Axes: without any repair" not in html
     assert ">without repair</th>" in html
     assert "<li>User-specified: velocity_scale = 1.5.</li>" in html
@@ -64,7 +64,7 @@ def test_six_sentences_stand_on_top_and_the_rest_is_folded_away() -> None:
 @pytest.mark.parametrize(
     ("value", "unit", "text"),
     [
-        (0.5, "share of the tracks", "50 %"),
+        (0.5, "share of the tracks", "50.0 %"),
         (0.02, "m/s", "0.0200\N{NO-BREAK SPACE}m/s"),
         (0.793, "°", "0.793°"),
         (0.361, "px", "0.361\N{NO-BREAK SPACE}px"),

@@ -9,7 +9,7 @@ from fgbaseline import compare
 from fgbaseline.compare.divergence_onset import divergence_onset, mask_share, worst_second, wrong_share
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Event, EventKind, Excluded, Observations
-from fgbaseline.reports.formatting import number
+from fgbaseline.reports.formatting import number, per_cent
 from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.phrases.run import verdict
 
@@ -80,9 +80,9 @@ def test_the_excluded_share_is_that_of_the_matches_around_the_onset() -> None:
     t = problem.sequence.t
     around = np.sum(np.abs(t - t[left.frame]) <= 1.0)
     masked = replace(run, problem=replace(problem, excluded=excluded))
-    sentence = sentence_of(masked, "Within 1 s of the first frame above the threshold the mask excluded")
     what = "as wrong matches, moving points or points that cannot be triangulated"
-    assert f"{100 / around:.3g} % (ekf) of the observations {what}; {100 / 60:.3g} % in the whole" in sentence
+    sentence = sentence_of(masked, f"Share of the observations that the mask excluded {what}, within 1 s of the first")
+    assert f": {100 / around:.3g} % (ekf); in the whole recording {100 / 60:.3g} %." in sentence
 
 
 def test_the_mask_sentence_counts_every_reason_and_its_worst_second_is_that_of_the_bookmark() -> None:
@@ -94,7 +94,7 @@ def test_the_mask_sentence_counts_every_reason_and_its_worst_second_is_that_of_t
     excluded[frame == 42] = Excluded.MOVING
     run = run_of(replace(problem, excluded=excluded), answer(problem, "ekf"), answer(problem, "isam2"))
     n, k = len(frame), int((excluded != Excluded.NO).sum())
-    assert f"The mask excluded {100 * k / n:.3g} % of the observations ({k:,} of {n:,})." in verdict(run)
+    assert f"The mask excluded {per_cent(k / n)} of the observations ({k:,} of {n:,})." in verdict(run)
     worst = worst_second(run.problem)
     assert worst is not None
     assert worst.second <= t[41] - t[0] < worst.second + 1.0
@@ -183,9 +183,9 @@ def test_an_order_within_the_sigma_of_the_reference_is_not_one_by_accuracy() -> 
         return [s for s in verdict(run) if "closer to isam2, not which is closer to the truth" in s]
 
     assert said(5.0) == [
-        "The divergences (RMSE) of dead-reckoning and ekf are below 3 times the position sigma of isam2 itself, 8.66 m "
+        "The divergences (RMSE) of dead-reckoning and ekf are below 3 times the position sigma of isam2, 8.66 m "
         "RMS: the ranking shows which is closer to isam2, not which is closer to the truth. Trusted means that isam2 "
-        "solves this problem well, not that its error is below its sigma."
+        "solves this problem well, not that it is close to the truth."
     ]
     assert not said(0.1)
 

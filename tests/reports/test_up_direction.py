@@ -80,7 +80,8 @@ def test_the_option_goes_before_the_files_and_a_file_before_the_assumption(tmp_p
     data.write_tum(tmp_path / "turned.tum", t, turn @ poses, turn[:3, :3] @ UP)
     nothing = compare(tmp_path / "bare.tum", tmp_path / "other.tum")
     assert (nothing.up_from, nothing.up.tolist()) == ("assumed", [0.0, 0.0, 1.0])
-    assert f"{ASSUMED}; (0, 0, 1) in the world of bare is assumed (--up sets it)." in nothing.verdict
+    assumed = f"{ASSUMED}; (0, 0, 1) in the world of bare is assumed (--up sets it)."
+    assert f"{assumed} View, height, left, above and heading depend on it." in nothing.verdict
     by_estimate = compare(tmp_path / "bare.tum", tmp_path / "other.tum", tmp_path / "turned.tum")
     assert by_estimate.up_from == "the file of turned"
     np.testing.assert_allclose(by_estimate.up, UP, atol=1e-9)
