@@ -23,7 +23,7 @@ def print_sentences(sentences: Sequence[str], most: int | None = None, mark: str
     for sentence in sentences[:most]:
         click.echo(_wrapped(sentence, mark) if sys.stdout.isatty() else f"{mark}{sentence}")
     if more := len(sentences[most:]) if most is not None else 0:
-        click.echo(f"The report has {more} more {'sentence' if more == 1 else 'sentences'}.")
+        click.echo(f"The report has {more} more {'conclusion' if more == 1 else 'conclusions'}.")
 
 
 def _wrapped(text: str, mark: str) -> str:

@@ -97,7 +97,7 @@ def not_identifiable(diagnosis: Diagnosis) -> tuple[str, ...]:
         return (f"Nothing about the velocities: {diagnosis.failure_reason}.",)
     sentences = [_unseen("linear velocity", diagnosis.linear), _unseen("angular velocity", diagnosis.angular)]
     if not diagnosis.timing.identifiable:
-        sentences.append("A time offset between velocities and images: that needs turns that both show.")
+        sentences.append("A time offset between velocities and images: this needs rotation that both measure.")
     deviation = diagnosis.gyro_bias_deviation
     if (deviation > KNOWN_BIAS).any():
         sentences.append(f"The gyroscope's bias better than to {vector(deviation, 4)} rad/s (standard errors).")
@@ -268,11 +268,11 @@ def _unseen(what: str, axes: Axes) -> str:
         return f"In which axes the {what} was recorded: the motion excites none of them enough."
     rows = axes.name.split(",")
     determined = listed(
-        f"{rows['xyz'.index(name)]} is along {name} of the IMU axes of imu_T_cam"
+        f"recorded {rows['xyz'.index(name)]} is along {name} of the IMU frame of imu_T_cam"
         for name in "xyz"
         if name not in unseen
     )
     return (
-        f"The {listed(unseen)} {noun(len(unseen), 'axis', 'axes')} of the {what}: the motion shows only that its "
-        f"{determined}, not the order or the signs of the other components."
+        f"The order and the signs of the {listed(unseen)} {noun(len(unseen), 'axis', 'axes')} of the {what}: the "
+        f"motion does not excite {noun(len(unseen), 'it', 'them')}. Determined: {determined}."
     )

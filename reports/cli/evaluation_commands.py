@@ -27,8 +27,8 @@ from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, Numbers, choice
 @click.option(
     "--up",
     type=XYZ,
-    help="Up in the reference's world.  [default: by a file's comment '# up x y z', KITTI's format, the run or "
-    "--sequence, else 0,0,1]",
+    help="Up direction in the reference's world frame.  [default: the first found of: the reference's comment "
+    "'# up x y z' or KITTI's format, the run, --sequence, an estimate's comment; else 0,0,1]",
 )
 @choice("--association", "nearest", "interpolated", what="Association of poses by time, each at most once.")
 @click.option("--tolerance", type=float, metavar="S", help="Largest time difference of a pair.  [default: 0.01]")
@@ -54,12 +54,13 @@ from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, Numbers, choice
     "--times",
     multiple=True,
     type=PATH,
-    help="Time stamps of KITTI files, one a line; repeatable: a file takes those of the same number.",
+    help="Time stamps of KITTI files, one a line. Repeatable: each KITTI file takes the stamps that are as many as its "
+    "poses.",
 )
 @click.option(
     "--time-unit",
     type=UNITS,
-    help="Unit of ambiguous time stamps.  [default: by header, size, rate and the other file]",
+    help="Unit of ambiguous time stamps.  [default: detected from the header, magnitude, rate and the other file]",
 )
 @click.option(
     "--quaternion",
@@ -90,8 +91,8 @@ from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, Numbers, choice
     type=float,
     default=0.0,
     metavar="SHARE",
-    help="Rank all trajectories by this share of the recording's tracks; export with the same SHARE and --seed for a "
-    "filter that does not use them.  [default: as the run]",
+    help="Rank all trajectories by how they predict this share of the recording's tracks. To withhold these from your "
+    "filter, export its problem with the same SHARE and --seed.  [default: as the run]",
 )
 @click.option(
     "--reference-body", type=BODY, default="imu", help="Frame of the reference's poses: world_T_imu or world_T_camera."
@@ -101,7 +102,7 @@ from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, Numbers, choice
 )
 @click.option("--extrinsic", type=PATH, help="imu_T_cam, one line of 12 numbers.  [default: of --sequence]")
 @click.option(
-    "--beside", default="all", show_default=True, help="Estimators of the run to compare too: names, all or none."
+    "--beside", default="all", show_default=True, help="Estimators of the run to compare as well: names, all or none."
 )
 @seed("the bootstrap and of the choice of held-out tracks")
 def compare(
@@ -114,10 +115,10 @@ def compare(
     opened: bool,
     **options: Any,
 ) -> None:
-    """Compare each ESTIMATE with REFERENCE: TUM, KITTI, EuRoC, OpenVINS or npz files, or ROS bags.
+    """Compare each ESTIMATE with REFERENCE.
 
-    REFERENCE may also be the folder of a run. Then its reference is used, the trust in it is printed first, and its
-    other estimators are compared too.
+    Both are trajectories: TUM, KITTI, EuRoC, OpenVINS or npz files, or ROS bags. REFERENCE may also be the folder of
+    a run. Then its reference is used, the trust in it is printed first, and its other estimators are compared too.
 
     Exits 0, or 2 on bad input.
     """
@@ -175,9 +176,10 @@ def check(
     update_baseline: bool,
     accept_worse: bool,
 ) -> int:
-    """Check the metrics in DIR against limits and an accuracy baseline, the metrics of an earlier run.
+    """Check the metrics in DIR against limits.
 
-    DIR is the folder of `run`, `compare` or `bench`. On GitHub the table also goes to the page of the job
+    DIR is the folder of `run`, `compare` or `bench`. Limits may refer to an accuracy baseline, the metrics of an
+    earlier run. On GitHub the table also goes to the page of the job
     (GITHUB_STEP_SUMMARY).
 
     Exits 0 when all limits hold, 1 when one is violated, 2 when one is undecided, and on bad input. A limit is
@@ -206,10 +208,11 @@ def check(
 @click.option("--out", type=PATH, help="Folder to write.  [default: DIR/paper]")
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier call.")
 def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: bool) -> int:
-    """Draw the figures of a run or comparison, the folder DIR, again for a paper in two columns.
+    """Draw the figures in DIR again, for a paper.
 
-    They are one column wide, with letters of 7 points, embedded fonts, and lines that differ without color. They show
-    what is in the folder; nothing is computed again. captions.json has a caption for each.
+    DIR is the folder of a run or comparison. The figures are one column wide, with letters of 7 points, embedded
+    fonts, and lines that differ without color. They show what is in the folder; nothing is computed again.
+    captions.json has a caption for each.
 
     Exits 0, or 2 on bad input.
     """
@@ -250,10 +253,11 @@ def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
 def bench(
     suite: Path, out: Path | None, data: Path | None, workers: int | None, scheduler: str | None, force: bool
 ) -> int:
-    """Run every recording, setting and seed of SUITE (TOML), and write a benchmark report.
+    """Run every recording, setting and seed of SUITE.
 
-    Finished runs are kept. The same command resumes an interrupted bench, and runs again only what has changed: a
-    recording, a setting, the source code. docs/bench.md describes suites and report.
+    SUITE is a TOML file. A benchmark report is written. Finished runs are kept: the same command resumes an
+    interrupted bench, and runs again only what has changed: a recording, a setting, the source code. docs/bench.md
+    describes suites and report.
 
     Exits 0 when every estimator succeeded in every run, 1 when one failed, 2 on bad input.
     """
@@ -291,7 +295,7 @@ def reproduce(
     sweep_features: tuple[int, ...],
     sweep_noise: tuple[float, ...],
 ) -> int:
-    """Draw the figures of the source paper from RECORDING... and test its claims.
+    """Draw the source paper's figures and test its claims.
 
     The source paper's recordings are 03.npz and 10.npz, recognized by their numbers of frames; others get figures of
     the same kind. For a recording without features, the trajectory is drawn. The other figures use features simulated

@@ -103,7 +103,7 @@ preset = choice(
 features = click.option(
     "--features",
     type=FeatureCount(),
-    help="Number of landmarks, those with the most observations.  [default: all; documented: 1000]",
+    help="Number of landmarks, those with the most observations.  [default: all; with --preset documented 1000]",
 )
 imu = click.option(
     "--imu",
@@ -131,7 +131,7 @@ as_recorded = click.option(
 repairs = click.option(
     "--repairs",
     type=PATH,
-    help="TOML file of your own repairs, applied beside those of the diagnosis. Only with --preset calibrated.",
+    help="TOML file of your own repairs, applied in addition to those of the diagnosis. Only with --preset calibrated.",
 )
 held_out = click.option(
     "--held-out",
@@ -144,9 +144,12 @@ held_out = click.option(
 _IMAGES = (
     click.option("--right", type=PATH, metavar="FOLDER", help="Images: folder of the right camera."),
     click.option(
-        "--calibration", type=PATH, metavar="YAML", help="Images: cameras of two folders or a bag, Kalibr or OpenCV."
+        "--calibration",
+        type=PATH,
+        metavar="YAML",
+        help="Images: calibration of folders or a bag, Kalibr or OpenCV.",
     ),
-    click.option("--times", type=PATH, metavar="FILE", help="Images: stamps of two folders, a line for each image."),
+    click.option("--times", type=PATH, metavar="FILE", help="Images: stamps of folders, a line for each image."),
     click.option("--topics", metavar="LEFT[,RIGHT][,IMU]", help="Images: topics of a bag.  [default: by their types]"),
     click.option(
         "--cameras",
@@ -161,7 +164,8 @@ _MOTION = (
         "--velocities",
         type=PATH,
         metavar="CSV",
-        help="Body velocities: stamp, vx, vy, vz, wx, wy, wz, used instead of any motion data of the input.",
+        help="Body velocities: stamp, vx, vy, vz (m/s), wx, wy, wz (rad/s), used instead of any motion data of the "
+        "input.",
     ),
     click.option("--extrinsic", type=PATH, metavar="FILE", help="imu_T_cam of the left camera: a line of 12 numbers."),
 )

@@ -23,23 +23,23 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @options.preset
 @click.option(
     "--estimators",
-    help=f"Names, separated by commas.  [default: {','.join(DEFAULT_ESTIMATORS)}; up to {BATCH_OBSERVATIONS:,} "
-    "unmasked observations also batch, started at the solution of isam2 only]",
+    help=f"Names, separated by commas.  [default: {','.join(DEFAULT_ESTIMATORS)}; with at most {BATCH_OBSERVATIONS:,} "
+    "unmasked observations also batch, which then starts at the solution of isam2 only]",
 )
 @click.option(
     "--estimator",
     "user_estimators",
     multiple=True,
     metavar="[NAME=]FILE:FUNCTION",
-    help="Function of a Python file, beside --estimators; repeatable.",
+    help="Function in a Python file, run in addition to --estimators; repeatable.",
 )
 @click.option(
     "--add",
     multiple=True,
     type=options.NamedFile(),
     metavar="[NAME=]PATH",
-    help="Trajectory file beside the estimators, aligned to the reference by yaw, or by SE(3) where the worlds are not "
-    "level; repeatable.",
+    help="Trajectory file to report in addition to the estimators, aligned to the reference by yaw, or by SE(3) where "
+    "the worlds are not level; repeatable.",
 )
 @click.option(
     "--add-body", type=options.BODY, help="Frame of the poses of --add: world_T_imu or world_T_camera.  [default: imu]"
@@ -61,8 +61,8 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @click.option(
     "--truth-up",
     type=options.XYZ,
-    help="Up in the world of the ground truth of raw inertial data.  [default: its z axis, within 0.5° of the samples' "
-    "up, else theirs]",
+    help="Raw inertial data: up direction in the world frame of the ground truth.  [default: 0,0,1 if the inertial "
+    "samples agree within 0.5°, else the direction that they measure]",
 )
 @options.as_recorded
 @options.imu
@@ -94,8 +94,8 @@ def run(
 ) -> int:
     """Run estimators on RECORDING, compare them and write a report.
 
-    RECORDING is a file with tracks, or a folder or ROS bag of images: their tracks are written into the folder of the
-    run, tracks.npz.
+    RECORDING is a file with tracks, or a folder or ROS bag with images. The tracks of images are written to
+    tracks.npz in the folder of the run.
 
     Without RECORDING, a simulated drive of 60 s through a town is used, with known ground truth.
 
@@ -131,7 +131,9 @@ def run(
 @options.imu_calibration
 @options.images
 def track(source: Path, out: Path, force: bool, settings: Path | None, topics: str | None, **given: Any) -> int:
-    """Track the images in INPUT: a EuRoC, TUM-VI or KITTI folder, two folders, or a ROS bag.
+    """Track the images in INPUT and write their tracks.
+
+    INPUT is a EuRoC, TUM-VI or KITTI folder, a folder of images (with --right for a pair), or a ROS bag.
 
     Rectified pairs, Lucas-Kanade from frame to frame and from left to right; a track that fails a check ends. With
     one camera (--cameras left, cam0 alone, one topic of images) the epipolar constraint is that check. The npz is a
@@ -146,7 +148,9 @@ def track(source: Path, out: Path, force: bool, settings: Path | None, topics: s
 
 @click.command(epilog="Example: fgbaseline estimators")
 def estimators() -> None:
-    """List the installed estimators, the ones of other packages included, with a line each.
+    """List the estimators, with a line each.
+
+    The list includes those of other installed packages.
 
     Exits 0.
     """
@@ -215,11 +219,11 @@ def diagnose(
 @options.held_out
 @options.seed("the choice of held-out tracks")
 def export(out: Path, force: bool, topics: str | None, settings: Path | None, **given: Any) -> int:
-    """Write the problem that `fgbaseline run` would solve on RECORDING: npz, CSV and JSON.
+    """Write the problem that run solves on RECORDING.
 
-    The files hold repaired velocities, increments with covariances, observations with the mask, noise, kernel,
-    priors, calibration and time stamps. A filter in any language can solve the same problem; `fgbaseline compare`
-    reads its trajectory. Ground truth is not exported.
+    The npz, CSV and JSON files hold repaired velocities, increments with covariances, observations with the mask,
+    noise, kernel, priors, calibration and time stamps. A filter in any language can solve the same problem;
+    `fgbaseline compare` reads its trajectory. Ground truth is not exported.
 
     Exits 0, or 2 on bad input.
     """
@@ -298,9 +302,10 @@ def simulate(
     accelerometer_bias: tuple[float, float, float] | None,
     **given: Any,
 ) -> None:
-    """Simulate a recording and write it to OUTPUT (.npz) with its ground truth.
+    """Simulate a recording with its ground truth.
 
-    The file has the arrays of docs/formats.md, with `ground_truth` and `landmarks`; `fgbaseline run` reads it.
+    OUTPUT is an npz file. It has the arrays of docs/formats.md, with `ground_truth` and `landmarks`; `fgbaseline run`
+    reads it.
 
     Exits 0, or 2 on bad input.
     """

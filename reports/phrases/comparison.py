@@ -26,8 +26,8 @@ def caption(comparison: Comparison) -> str:
     parts = [text if len(names) == 1 else f"{listed(those)}: {text}" for text, those in names.items()]
     name = comparison.reference.name
     return (
-        f"Compared with {name}: {'. '.join(parts)}. Up is {_shown_up(comparison)} in the world of {name} "
-        f"({comparison.up_from}). Brackets: 95 % intervals (block bootstrap)."
+        f"Compared with {name}: {'. '.join(parts)}. Up is {_shown_up(comparison)} in the world frame of {name} "
+        f"(source: {comparison.up_from}). Brackets: 95 % intervals (block bootstrap)."
     )
 
 

@@ -88,7 +88,7 @@ def reference_sigma_sentence(name: str, sigma: Mapping[str, float | None]) -> st
         number(sigma[key]) for key in ("position_rmse", "position_final", "rotation_rmse_deg", "rotation_final_deg")
     )
     return (
-        f"Sigma of {name} itself, with its start fixed: position (3D) {along} m RMS, {final} m at the end; "
+        f"Sigma of the reference {name}, with its start fixed: position (3D) {along} m RMS, {final} m at the end; "
         f"rotation {turn}° RMS, {final_turn}° at the end."
     )
 

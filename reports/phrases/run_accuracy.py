@@ -23,7 +23,7 @@ from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.reference_trust import BATCH_CRITERIA
 from fgbaseline.compare.sample_sizes import insufficient_truth
 from fgbaseline.data import EventKind
-from fgbaseline.data.wording import plural
+from fgbaseline.data.wording import noun, plural
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import counted, distance, listed, number, per_cent, resolved
@@ -132,7 +132,7 @@ def _ranked(run: Run, rivals: dict[str, Result], found: PairedRanking) -> list[s
     def each(names: Iterable[str]) -> str:
         return listed(f"{name} {distance(found.rmse[name])}{_share(found.rmse[name], rivals[name])}" for name in names)
 
-    over = f"RMSE over a path length of {number(path_length(rivals[first]))} m{_over(run, found)}"
+    over = f"RMSE over a path length of {number(path_length(rivals[first]))} m{_over(run, found)}{_unranked(run)}"
     larger = [name for name in others if is_claimed(found.behind[name], found.rmse[name], found.rmse[first])]
     level = [name for name in others if name not in larger]
     equal = [name for name in level if number(found.rmse[name]) == number(found.rmse[first])]
@@ -185,6 +185,16 @@ def _uncertain(differences: Mapping[tuple[str, str], RmseDifference]) -> str:
     title = "The difference is" if len(each) == 1 else "The differences are"
     interval = "Its 95 % interval is" if len(each) == 1 else "Their 95 % intervals are"
     return f" {title} {listed(each)}. {interval} rough: {why}."
+
+
+def _unranked(run: Run) -> str:
+    """Clause on the results of the reference's own graph, which may be closer to it than all that are ranked."""
+    names = [r.name for r in run.results.values() if r.name in run.same_graph | run.by_products]
+    known = [name for name in names if name != run.reference and run.results[name].divergence is not None]
+    if not known:
+        return ""
+    results = noun(len(known), "a result", "results")
+    return f"; {listed(known)}, {results} of the graph of {run.reference}, {noun(len(known), 'is', 'are')} not ranked"
 
 
 def _over(run: Run, found: PairedRanking) -> str:

@@ -105,8 +105,8 @@ def _noise(diagnosis: Diagnosis) -> str:
     assert fit is not None
     sigma, white = fit.sigmas, fit.white
     text = (
-        f"Noise (1-sigma): {sigma.linear_velocity:.3f} m/s and {sigma.angular_velocity:.4f} rad/s for each axis of a "
-        f"velocity over its interval, "
+        f"Noise (1-sigma): {sigma.linear_velocity:.3f} m/s and {sigma.angular_velocity:.4f} rad/s for each axis of the "
+        f"velocity between two frames, "
     )
     if fit.inflation.pixel > 1.0:
         text += (

@@ -42,7 +42,7 @@ METRICS = (
     Metric(
         ("coverage",),
         "coverage",
-        "of the time",
+        "share of the time",
         "%",
         tables=MAIN | TERMINAL | BENCH | COMPARISON,
         scale=PERCENT,
@@ -68,7 +68,7 @@ METRICS = (
     Metric(("ate_unaligned", "final"), glossary.ATE, "final, unaligned", "m", LOWER, EVIDENCE),
     Metric(("translation", "rmse"), glossary.ATE, "RMSE", "m", LOWER, COMPARISON),
     Metric(("common", "rmse"), glossary.ATE, "RMSE over common stamps", "m", LOWER, COMPARISON, same_data=True),
-    Metric(("behind",), glossary.ATE, "RMSE above the smallest", "m", tables=COMPARISON),
+    Metric(("behind",), glossary.ATE, "RMSE minus the smallest", "m", tables=COMPARISON),
     Metric(("translation", "mean"), glossary.ATE, "mean", "m", LOWER, COMPARISON),
     Metric(("translation", "median"), glossary.ATE, "median", "m", LOWER, COMPARISON),
     Metric(("translation", "std"), glossary.ATE, "standard deviation", "m", tables=COMPARISON),

@@ -82,7 +82,7 @@ def metrics_columns(comparison: Comparison, results: Results) -> dict[str, list[
 def _metrics(comparison: Comparison, results: Mapping[str, Any]) -> list[Metric]:
     """Metrics of which some trajectory has a value."""
     found = [result.segments for result in comparison.results.values() if result.segments is not None]
-    fitted = "" if all(s.official for s in found) else f"{SEGMENTS} (lengths fitted to the trajectory)"
+    fitted = "" if all(s.official for s in found) else f"{SEGMENTS} (lengths other than KITTI's)"
     return [
         replace(m, group=fitted, term=SEGMENTS) if fitted and m.group == SEGMENTS else m
         for m in over_deltas(shown_in(COMPARISON), comparison.deltas)

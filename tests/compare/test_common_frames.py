@@ -120,7 +120,7 @@ def test_coverage_stands_beside_the_ranks_in_every_table(lost: Path) -> None:
     result = compare(lost / "gt.tum", lost / "whole.tum", lost / "lost.tum", align="none")
     result.report(lost / "out")
     for text in (markdown(result.text_table), latex(result.text_table), (lost / "out" / "report.html").read_text()):
-        assert "of the time, %" in text.replace("\\%", "%")
+        assert "share of the time, %" in text.replace("\\%", "%")
         assert "49.7" in text
         assert "RMSE over common stamps, m" in text
     bold = [line for line in latex(result.text_table).splitlines() if r"\textbf" in line]
@@ -128,7 +128,7 @@ def test_coverage_stands_beside_the_ranks_in_every_table(lost: Path) -> None:
     assert "common stamps" in bold[0]
     with (lost / "out" / "table.csv").open(newline="") as file:
         rows = {row["estimate"]: row for row in csv.DictReader(file)}
-    assert float(rows["lost"]["coverage: of the time, %"]) == pytest.approx(100 * 99 / 199)
+    assert float(rows["lost"]["coverage: share of the time, %"]) == pytest.approx(100 * 99 / 199)
     assert json.loads((lost / "out" / "comparison.json").read_text())["estimates"]["lost"]["rank"] == 2
 
 
@@ -169,9 +169,9 @@ def test_a_run_ranks_over_the_frames_that_all_estimators_have() -> None:
     assert any("ekf 49.2 %" in s for s in said)
     assert f"They are ranked over the {problem.n_frames // 2} frames that all have." in said
     table = main_table(run, estimators)
-    assert {"of the time, %", "RMSE over common frames, m"} <= {c.heading for c in table.columns}
+    assert {"share of the time, %", "RMSE over common frames, m"} <= {c.heading for c in table.columns}
     whole = main_table(run_of(problem, answer(problem, "ekf"), answer(problem, "isam2")), estimators)
-    assert "of the time, %" not in {c.heading for c in whole.columns}
+    assert "share of the time, %" not in {c.heading for c in whole.columns}
 
 
 @given(st.lists(st.lists(st.sampled_from([np.nan, 1.0, 2.0, 3.0]), min_size=3, max_size=3), min_size=2, max_size=6))

@@ -170,10 +170,10 @@ def test_up_of_a_camera_is_that_of_its_format_and_the_caption_names_it(tmp_path:
     camera = compare(tmp_path / "truth.txt", f"it={tmp_path / 'drifting.txt'}", align="yaw")
     level = compare(tmp_path / "truth_level.txt", f"it={tmp_path / 'drifting_level.txt'}", align="yaw")
     assert figures(camera)["translation.rmse"] == pytest.approx(figures(level)["translation.rmse"])
-    assert "Up is (0, -1, 0) in the world of truth (KITTI's camera frame)" in camera.caption
-    assert "Up is (0, 0, 1) in the world of truth_level (assumed)" in level.caption
+    assert "Up is (0, -1, 0) in the world frame of truth (source: KITTI's camera frame)" in camera.caption
+    assert "Up is (0, 0, 1) in the world frame of truth_level (source: assumed)" in level.caption
     asked = compare(tmp_path / "truth.txt", f"it={tmp_path / 'drifting.txt'}", align="yaw", up=(0.0, 0.0, 1.0))
-    assert "Up is (0, 0, 1) in the world of truth (--up)" in asked.caption
+    assert "Up is (0, 0, 1) in the world frame of truth (source: --up)" in asked.caption
     assert figures(asked)["translation.rmse"] > 2.0 * figures(camera)["translation.rmse"]
 
 

@@ -54,7 +54,7 @@ def test_the_sigma_of_the_reference_is_in_summary_and_sentence() -> None:
     assert reference.sigma is not None
     assert reference.sigma.position_rmse == pytest.approx(0.1 * np.sqrt(3.0))
     assert reference.sigma.rotation_final_deg == pytest.approx(np.rad2deg(0.1 * np.sqrt(3.0)))
-    said = "Sigma of isam2 itself, with its start fixed: position (3D) 0.173 m RMS, 0.173 m at the end; rotation "
+    said = "Sigma of the reference isam2, with its start fixed: position (3D) 0.173 m RMS, 0.173 m at the end; rotation "
     assert any(s.startswith(said) for s in verdict(run))
 
 
@@ -152,7 +152,7 @@ def test_a_limit_below_the_sigma_of_the_reference_is_undecided(at_most: float, c
     limits.write_text(text + "within_reference_sigma = true\n")
     checked = evaluate(read_limits(limits), read_folder(tmp_path), None)
     assert checked.exit_code == code
-    assert checked.sigmas[0].startswith("Sigma of isam2 itself, with its start fixed: position (3D) 0.173 m RMS")
+    assert checked.sigmas[0].startswith("Sigma of the reference isam2, with its start fixed: position (3D) 0.173 m RMS")
     limits.write_text(text)
     assert evaluate(read_limits(limits), read_folder(tmp_path), None).exit_code == (1 if code else 0)
 

@@ -75,7 +75,7 @@ def test_sentences_on_a_terminal_are_a_short_list_whose_lines_break_between_word
     for figure in ("0.286 %", *(f"{i + 0.5} × 10⁻⁴ m" for i in range(8)), *(f"[{i}.25, {i}.75]" for i in range(8))):
         assert "\n".join(shown).count(figure) == "".join(sentences[:6]).count(figure)
     assert " ".join(" ".join(shown).split()) == " ".join(f"- {sentence}" for sentence in sentences[:6])
-    assert more == "The report has 3 more sentences."
+    assert more == "The report has 3 more conclusions."
 
 
 def test_sentences_in_a_file_have_one_line_each(capsys: pytest.CaptureFixture[str]) -> None:

@@ -45,7 +45,7 @@ def test_files_of_a_run_are_compared_as_the_run_itself_is(folder: Path, tmp_path
         for column, values in by_run.results[name].divergence.items():
             np.testing.assert_array_equal(result.divergence[column], values, err_msg=f"{name} {column}")
     assert charts(by_files) == charts(by_run)
-    assert "Up is (0.1, 0, -0.995) in the world of isam2 (the file of isam2)" in by_files.caption
+    assert "Up is (0.1, 0, -0.995) in the world frame of isam2 (source: the file of isam2)" in by_files.caption
     assert not any(ASSUMED in sentence or CONTRADICTED in sentence for sentence in by_files.verdict)
     by_files._fill_tables(tmp_path)
     again = compare(*(tmp_path / "trajectories" / path.name for path in paths), align="none")
