@@ -193,8 +193,7 @@ def _unranked(run: Run) -> str:
     known = [name for name in names if name != run.reference and run.results[name].divergence is not None]
     if not known:
         return ""
-    results = noun(len(known), "a result", "results")
-    return f"; {listed(known)}, {results} of the graph of {run.reference}, {noun(len(known), 'is', 'are')} not ranked"
+    return f"; {listed(known)}, of the same graph, {noun(len(known), 'is', 'are')} not ranked"
 
 
 def _over(run: Run, found: PairedRanking) -> str:

@@ -57,7 +57,7 @@ def test_six_sentences_stand_on_top_and_the_rest_is_folded_away() -> None:
     assert len(sentences) > 6
     shown, folded = page[: page.index('<section id="table"')].split("<details>")
     assert shown.count("<li>") == 6
-    assert f"{len(sentences) - 6} more sentence" in folded
+    assert f"{len(sentences) - 6} more conclusion" in folded
     assert folded.count("<li>") == len(sentences) - 6
 
 
