@@ -54,7 +54,9 @@ def test_the_sigma_of_the_reference_is_in_summary_and_sentence() -> None:
     assert reference.sigma is not None
     assert reference.sigma.position_rmse == pytest.approx(0.1 * np.sqrt(3.0))
     assert reference.sigma.rotation_final_deg == pytest.approx(np.rad2deg(0.1 * np.sqrt(3.0)))
-    said = "Sigma of the reference isam2, with its start fixed: position (3D) 0.173 m RMS, 0.173 m at the end; rotation "
+    said = (
+        "Sigma of the reference isam2, with its start fixed: position (3D) 0.173 m RMS, 0.173 m at the end; rotation "
+    )
     assert any(s.startswith(said) for s in verdict(run))
 
 
