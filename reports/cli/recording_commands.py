@@ -61,8 +61,8 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @click.option(
     "--truth-up",
     type=options.XYZ,
-    help="Up in the world of the ground truth of raw inertial data.  [default: its z axis, within 0.5° of the samples' "
-    "up, else theirs]",
+    help="Up in the world of the ground truth of raw inertial data.  [default: its file's comment '# up x y z', else "
+    "its z axis, within 0.5° of the samples' up, else theirs]",
 )
 @options.as_recorded
 @options.imu
