@@ -1,9 +1,8 @@
 """NEES of the 15 over simulated drives with raw inertial samples, `python -m benchmarks.inertial_consistency`.
 
 Problems of tests/builders/inertial.py: 30 stereo tracks a frame without wrong matches, samples at 100 Hz, true noise,
-and a start drawn from its covariance. Without the kernel: it would take large Gaussian noise for wrong matches, and the
-online smoother keeps the weights of its first linearization. `waves` has an IMU ten times noisier than the simulator's.
-docs/consistency.md has the figures.
+and a start drawn from its covariance. The kernel is left out by default: it takes large Gaussian noise for wrong
+matches. `waves` has an IMU ten times noisier than the simulator's. docs/consistency.md has the figures.
 """
 
 # ruff: noqa: E402

@@ -143,6 +143,18 @@ class MeasurementModel:
         """Kernel weights of squared whitened norms (...); 1 without a kernel."""
         return np.ones_like(squared) if self.kernel is None else self.kernel.weight(squared)
 
+    def weight_at(self, world_T_cam: FloatArray, points: FloatArray, pixel: FloatArray) -> FloatArray:
+        """Kernel weights (n,) of pixels (n, 4) of world points (n, 3), seen from cameras at poses (n, 4, 4) or (4, 4).
+
+        1 for points behind their camera, where a factor has no gradient.
+        """
+        R, p = world_T_cam[..., :3, :3], world_T_cam[..., :3, 3]
+        q = np.einsum("...ji,...j->i...", R, points - p)
+        with np.errstate(divide="ignore", invalid="ignore"):  # at the camera's plane
+            residual = (self.rows_of(pixel).T - self.camera.rows(q).pixel) * self.whitening_scale[:, None]
+            squared = np.einsum("in,in->n", residual, residual)
+        return np.where(q[2] > self.camera.min_depth, self.weight(squared), 1.0)
+
     def weighted(self, squared: FloatArray) -> FloatArray:
         """Squared whitened norms (...) times the kernel weight."""
         return squared if self.kernel is None else self.kernel.weighted(squared)

@@ -32,6 +32,8 @@ class GraphBuilder:
         self._rows: list[list[float]] = problem.measurement.rows_of(self.observations.pixel).tolist()
         self.factors = FactorBuilder(problem)
         self.uninitialized = UninitializedLandmarks(problem, self.observations, criterion)
+        self.weight = np.ones(len(self.observations))
+        """(n,) kernel weights of the observations; the solver may renew them"""
         self.online = FrameStates.unknown(problem)
         """causal estimates: the state of frame k from data up to k. The solver sets these, and `landmark_position`."""
         self.landmark_position: dict[int, FloatArray] = {}
@@ -57,6 +59,8 @@ class GraphBuilder:
         new_landmarks = self.uninitialized.initialize(candidates, self._path(candidates, states))
         values = gtsam.Values()
         states.insert(values, k)
+        for entry in new_landmarks:
+            self.weight[entry.observations] = entry.weights
         return FrameUpdate(k, states.world_T_imu[k], values, motion_factor, tuple(new_landmarks), tracked)
 
     def _predict(self, k: int, tracked: dict[int, int]) -> gtsam.NonlinearFactor:
@@ -70,6 +74,8 @@ class GraphBuilder:
             pixel = self.observations.pixel[list(tracked.values())]
             information: FloatArray = np.linalg.inv(covariance).astype(np.float64)
             pose = refine_predicted_pose(self.problem, information, pose, points, pixel)
+            world_T_cam = pose @ self.problem.sequence.imu_T_cam
+            self.weight[list(tracked.values())] = self.problem.measurement.weight_at(world_T_cam, points, pixel)
         self.online.world_T_imu[k] = pose
         return factor
 
@@ -98,9 +104,9 @@ class GraphBuilder:
         path[frames] = self.current_poses(frames)
         return path
 
-    def observation(self, observation: int, key: int) -> gtsam.NonlinearFactor:
-        """Factor of one observation of the landmark `key`."""
-        return self.factors.observation(self.frame[observation], key, self._rows[observation])
+    def observation(self, observation: int, key: int, weight: float | None = None) -> gtsam.NonlinearFactor:
+        """Factor of one observation of the landmark `key`, under the kernel, or with a `weight` in its place."""
+        return self.factors.observation(self.frame[observation], key, self._rows[observation], weight)
 
     def observed_landmarks(self, observed: range) -> IntArray:
         """Landmarks of a frame's observations."""

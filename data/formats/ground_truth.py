@@ -35,7 +35,8 @@ def attach_truth(sequence: Sequence, path: FilePath | Trajectory, frame: BodyFra
     end have no truth. In a file with stamps the pose of a frame is the one nearest in time, if it lies within half the
     median interval of the frames; one pose belongs to one frame. Frames without truth are NaN and counted in a remark.
 
-    With raw inertial samples the poses keep the axes of the file's world, and frame 0 may be without one.
+    With raw inertial samples the poses keep the axes of the file's world, and frame 0 may be without one. A comment
+    `# up x y z` of the file is then `Truth.up`; without raw samples it is `Sequence.up_imu`.
 
     It replaces what truth the recording has. Raises InputError naming file and line for bad text, and when `frame` is
     missing, the file has more lines than the recording has frames (KITTI), no stamp fits (TUM), or frame 0 has no pose.
@@ -46,16 +47,23 @@ def attach_truth(sequence: Sequence, path: FilePath | Trajectory, frame: BodyFra
             f"{name}: the truth frame is {frame!r}; say whether the poses are those of the 'camera' or the 'imu'"
         )
     with reading(name), np.errstate(all="ignore"):
+        up = None
         if isinstance(path, Trajectory):
             poses, line, remarks = _matched(sequence, path)
         else:
-            poses, line, remarks = _poses_of_frames(sequence, path, frame)
+            file = read_trajectory_file(path)
+            up = file.up if file.up_stated else None
+            poses, line, remarks = _poses_of_frames(sequence, file, frame)
         if frame == "camera":
             poses = poses @ se3.inverse(sequence.imu_T_cam)
         inertial = sequence.imu is not None
         truth = inertial_truth(poses, name) if inertial else Truth.from_any_world(poses, source=name)
         if inertial and frame == "imu" and not isinstance(path, Trajectory):
             truth = with_state(truth, path, line)
+        if up is not None and inertial:
+            truth = replace(truth, up=up)
+        elif up is not None:
+            sequence = replace(sequence, up_imu=poses[0, :3, :3].T @ up)
         missing = sequence.n_frames - int(truth.known.sum())
         if missing:
             remarks.append(f"{missing} of {sequence.n_frames} frames have no ground truth in {name}.")
@@ -88,16 +96,15 @@ def _apart(sequence: Sequence, path: Trajectory, frames: IntArray, nearest: IntA
 
 
 def _poses_of_frames(
-    sequence: Sequence, path: FilePath, frame: BodyFrame | None
+    sequence: Sequence, file: ParsedTrajectory, frame: BodyFrame | None
 ) -> tuple[FloatArray, IntArray, list[str]]:
     """The poses (T, 4, 4) in the file's own world, NaN where it has none, their lines (T,) and what there is to say."""
-    file = read_trajectory_file(path)
     if file.has_positions_only:
         raise InputError(
             "it has positions without orientations, which a run needs to bring it to its own world; run without it and "
             "compare the run with it: fgbaseline compare TRUTH trajectories/NAME.tum --lever-arm X,Y,Z"
         )
-    remarks = [f"{shown(path)}: {remark}." for remark in file.remarks]
+    remarks = [f"{file.source}: {remark}." for remark in file.remarks]
     poses = np.full((sequence.n_frames, 4, 4), np.nan)
     if file.stamps is None:
         frames, lines = _frames(sequence, file)
@@ -105,13 +112,13 @@ def _poses_of_frames(
         return poses, _lines(file, sequence.n_frames, frames, lines), remarks
     unit = _unit(sequence, file)
     if unit is not TimeUnit.S:
-        remarks.append(f"The time stamps of {shown(path)} are in {unit.noun}: divided by {unit.per_second:,}.")
+        remarks.append(f"The time stamps of {file.source} are in {unit.noun}: divided by {unit.per_second:,}.")
     read = file.trajectory(unit)
     frames, nearest = match_stamps(sequence.t, read.t)
     order = _order(sequence, file, frame, frames, nearest)
     if order != file.orders[0]:
         remarks.append(
-            f"The quaternions of {shown(path)} are read as {in_words(order)}: so they turn as the gyroscope."
+            f"The quaternions of {file.source} are read as {in_words(order)}: so they turn as the gyroscope."
         )
         read = file.trajectory(unit, order)
     if not len(frames):

@@ -61,8 +61,8 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
 @click.option(
     "--truth-up",
     type=options.XYZ,
-    help="Raw inertial data: up direction in the world frame of the ground truth.  [default: 0,0,1 if the inertial "
-    "samples agree within 0.5°, else the direction that they measure]",
+    help="Raw inertial data: up direction in the world frame of the ground truth.  [default: its file's comment "
+    "'# up x y z', else 0,0,1 if the inertial samples agree within 0.5°, else the direction that they measure]",
 )
 @options.as_recorded
 @options.imu

@@ -95,8 +95,8 @@ def run(
         landmarks: Landmarks of the documented SLAM: updated in turn with the pose, or held.
         truth: Ground truth: a file, a `Truth`, poses (T, 4, 4) by frame, or stamps (n,), s, with poses (n, 4, 4).
         truth_frame: Body whose poses the ground truth has; a `Truth` has those of the imu.
-        truth_up: Up in the world of the ground truth of raw inertial data; by default its z axis within 0.5° of what
-            the samples measure, and beyond that what they measure.
+        truth_up: Up in the world of the ground truth of raw inertial data; by default its file's comment `# up x y z`,
+            else its z axis within 0.5° of what the samples measure, and beyond that what they measure.
         as_recorded: No diagnosis and no repairs; the noise is assumed.
         imu: CSV of raw inertial samples, in place of the recording's velocities.
         imu_calibration: YAML of their noise; by default assumed.

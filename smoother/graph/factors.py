@@ -3,6 +3,7 @@
 `StereoPoint2` has the rows (uL, uR, v) of `geometry.measurement_model`, with their variances; one camera has (uL, v).
 """
 
+import math
 from collections.abc import Iterable
 
 import gtsam
@@ -30,6 +31,8 @@ class FactorBuilder:
         self._left = gtsam.Cal3_S2(*pinhole)
         self._stereo = gtsam.Cal3_S2Stereo(*pinhole, camera.baseline) if isinstance(camera, StereoCamera) else None
         self.imu_P_cam = gtsam.Pose3(problem.sequence.imu_T_cam)
+        self._row_sigmas = np.sqrt(problem.measurement.row_variance)
+        self._gaussian_noise = gtsam.noiseModel.Diagonal.Sigmas(self._row_sigmas)
         self.pixel_noise = pixel_noise(problem)
         self.steps = se3.exp(problem.increment)
         self.step_covariance = reorder_tangent(problem.increment_covariance)
@@ -73,12 +76,21 @@ class FactorBuilder:
         step = gtsam.Pose3(self.steps[frame])
         return gtsam.BetweenFactorPose3(pose_key(frame), pose_key(frame + 1), step, noise)
 
-    def observation(self, frame: int, key: int, rows: Iterable[float]) -> gtsam.NonlinearFactor:
+    def observation(
+        self, frame: int, key: int, rows: Iterable[float], weight: float | None = None
+    ) -> gtsam.NonlinearFactor:
         """Factor of the rows (r,), px, of an observation of the landmark `key`: uL, uR, v, or uL, v of one camera.
 
-        It does not throw where the point is behind the camera: residual and Jacobian then say nothing (`cheirality`).
+        With a `weight` in place of the kernel it is Gaussian, with this factor on its information. It does not throw
+        where the point is behind the camera: residual and Jacobian then say nothing (`cheirality`).
         """
-        noise, pose, no_throw = self.pixel_noise, pose_key(frame), (False, False)
+        if weight is None:
+            noise = self.pixel_noise
+        elif weight == 1.0:
+            noise = self._gaussian_noise
+        else:
+            noise = gtsam.noiseModel.Diagonal.Sigmas(self._row_sigmas / math.sqrt(weight))
+        pose, no_throw = pose_key(frame), (False, False)
         if self._stereo is None:
             pixel = np.array([*rows])
             return gtsam.GenericProjectionFactorCal3_S2(pixel, noise, pose, key, self._left, *no_throw, self.imu_P_cam)

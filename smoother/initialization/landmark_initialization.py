@@ -33,6 +33,8 @@ class NewLandmark:
     """(3,) m, in the world frame"""
     observations: list[int]
     """indices into the problem's observations"""
+    weights: FloatArray
+    """(n,) kernel weights of these observations, along the trajectory of the triangulation"""
 
 
 class UninitializedLandmarks:
@@ -76,7 +78,7 @@ class UninitializedLandmarks:
         may have a larger standard deviation than the rule allows.
         """
         if self._problem.landmark_prior is not None:
-            return [self._initialize_at_prior(landmark) for landmark in candidates]
+            return [self._initialize_at_prior(landmark, world_T_imu) for landmark in candidates]
         if not candidates:
             return []
         lengths = np.array([len(self._observed[j]) for j in candidates])
@@ -89,15 +91,21 @@ class UninitializedLandmarks:
         )
         distance = np.linalg.norm(position - world_T_cam[np.cumsum(lengths) - 1, :3, 3], axis=1)
         determined = front & (deviation < self._criterion.max_relative_deviation * distance)
+        weight = self._problem.measurement.weight_at(world_T_cam, position[row], self._observations.pixel[index])
+        weights = np.split(weight, np.cumsum(lengths)[:-1])
         return [
-            NewLandmark(j, position[i], self._observed.pop(j)) for i, j in enumerate(candidates) if bool(determined[i])
+            NewLandmark(j, position[i], self._observed.pop(j), weights[i])
+            for i, j in enumerate(candidates)
+            if bool(determined[i])
         ]
 
-    def _initialize_at_prior(self, landmark: int) -> NewLandmark:
-        prior = self._problem.landmark_prior
+    def _initialize_at_prior(self, landmark: int, world_T_imu: FloatArray) -> NewLandmark:
+        prior, observed = self._problem.landmark_prior, self._observed.pop(landmark)
         assert prior is not None
-        row = int(np.searchsorted(self._problem.features, landmark))
-        return NewLandmark(landmark, prior.mean[row], self._observed.pop(landmark))
+        position = prior.mean[int(np.searchsorted(self._problem.features, landmark))]
+        world_T_cam = world_T_imu[self._observations.frame[observed]] @ self._problem.sequence.imu_T_cam
+        weights = self._problem.measurement.weight_at(world_T_cam, position[None], self._observations.pixel[observed])
+        return NewLandmark(landmark, position, observed, weights)
 
     def _triangulate(
         self, index: IntArray, row: IntArray, world_T_cam: FloatArray, n: int

@@ -19,6 +19,7 @@ from ..graph.keys import distance_key, landmark_of, pose_key, state_keys
 from ..graph.marginal_covariances import joint_covariance
 from ..graph_builder import GraphBuilder
 from .elimination_ordering import EliminationOrdering
+from .kernel_weights import changed_weights
 from .marginalized_isam2 import NO_POSE, MarginalizedISAM2, marginalization_horizon
 from .settings import ISAM2Settings
 
@@ -50,6 +51,8 @@ class IncrementalSmoother:
         """whether a frame without its observations is accepted, as QR would not keep them either"""
         self.builder = GraphBuilder(problem, settings.initialization)
         self._inertial = problem.imu is not None
+        self._weighted = settings.weights_at_estimate and problem.kernel is not None
+        """whether observations in the tree are Gaussian with their kernel weights"""
         if problem.sequence.monocular:
             self.builder.current_poses = self._current_poses
         self.key: dict[int, int] = {}
@@ -182,10 +185,10 @@ class IncrementalSmoother:
                 graph.add(factors.landmark_prior(j, key))
                 owner.append((j, PRIOR))
             for i in entry.observations:
-                graph.add(self.builder.observation(i, key))
+                graph.add(self._observation(i, key))
                 owner.append((j, i))
         for j, i in update.tracked.items():
-            graph.add(self.builder.observation(i, self.key[j]))
+            graph.add(self._observation(i, self.key[j]))
             owner.append((j, i))
         if update.new_landmarks and not update.tracked:
             self._reinitialization_frames = REINITIALIZATION_FRAMES
@@ -197,18 +200,44 @@ class IncrementalSmoother:
         # first frame of each factor in the order of `graph`: motion, then landmark priors (no pose) and observations
         frames = [max(k - 1, 0), *(NO_POSE if i == PRIOR else self.builder.frame[i] for _, i in owner)]
         relinearize, no_relin_keys = self._relinearization(k)
+        weights = self._renewed_weights(k, dropped) if relinearize and self._weighted else {}
+        replaced = dict[int, gtsam.NonlinearFactor]()
+        for i, weight in weights.items():
+            j = int(self.builder.observations.landmark[i])
+            replaced[self._slots[j][i]] = self.builder.observation(i, self.key[j], weight)
         try:
             state = state_keys(k, self._inertial)
-            slots = self.solver.update(graph, frames, values, state, removed, groups, relinearize, no_relin_keys)
+            slots = self.solver.update(
+                graph, frames, values, state, removed, groups, relinearize, no_relin_keys, replaced
+            )
         except IndeterminateSystemError:
             self._ordering.remove(new.values())
             raise
+        self.builder.weight[list(weights)] = list(weights.values())
         self._reinitialization_frames = max(0, self._reinitialization_frames - 1)
         for j in present:
             del self.key[j], self._slots[j]
         self.key |= new
         for (j, i), slot in zip(owner, slots[1:], strict=True):
             self._slots.setdefault(j, {})[i] = slot
+
+    def _observation(self, i: int, key: int) -> gtsam.NonlinearFactor:
+        """Factor of an observation in the tree."""
+        return self.builder.observation(i, key, self.builder.weight[i] if self._weighted else None)
+
+    def _renewed_weights(self, k: int, dropped: Collection[int]) -> dict[int, float]:
+        """Kernel weights at the estimate before frame k, by observation, where they changed.
+
+        They are of the observations in the last `recent_frames` frames, as far as the tree has their factors.
+        """
+        o, first = self.builder.observations, max(k - self._settings.recent_frames, self._first)
+        start, end = np.searchsorted(o.frame, [first, k]).tolist()
+        known = [
+            i
+            for i, j in enumerate(o.landmark[start:end].tolist(), start)
+            if j in self.key and j not in dropped and i in self._slots[j] and self.solver.in_tree(self._slots[j][i])
+        ]
+        return changed_weights(self.builder, self.solver.tree, self.key, np.array(known, dtype=np.int64))
 
     def _relinearization(self, k: int) -> tuple[bool, gtsam.KeyList | None]:
         """Whether frame k relinearizes, and the older variables, which then keep their linearization points.
@@ -249,8 +278,11 @@ class IncrementalSmoother:
         )
 
     def release(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-        """Factors in their slots and the solution, after the last frame; frees the tree."""
+        """Factors in their slots, under the kernel, and the solution, after the last frame; frees the tree."""
         graph, values = self.solver.release()
+        observed = [(j, i, slot) for j, slots in self._slots.items() for i, slot in slots.items() if i != PRIOR]
+        for j, i, slot in observed if self._weighted else []:
+            graph.replace(slot, self.builder.observation(i, self.key[j]))
         active = set(self.key.values())
         for key in values.keys():  # noqa: SIM118
             if landmark_of(key) is not None and key not in active:  # dropped, but still in the linear prior

@@ -61,15 +61,19 @@ class MarginalizedISAM2:
         groups: Mapping[int, int] | None = None,
         relinearize: bool = False,
         no_relin_keys: gtsam.KeyList | None = None,
+        replaced: Mapping[int, gtsam.NonlinearFactor] | None = None,
     ) -> Listing[int]:
         """Update the tree, see `CheckpointedISAM2`; returns the slots of the new factors, in their order.
 
         `frames` has the first frame among the poses of each factor, or NO_POSE. `newest` are the keys of the newest
         state, to which the auxiliary pose is tied from now on. `removed` are slots; factors that are already in the
-        prior stay in it. Raises IndeterminateSystemError.
+        prior stay in it. `replaced` has new factors for slots in the tree (`in_tree`). Raises IndeterminateSystemError.
         """
-        places = [self._tree_slot[slot] for slot in removed if self._tree_slot[slot] != IN_PRIOR]
+        replaced = replaced or {}
+        places = [self._tree_slot[slot] for slot in (*removed, *replaced) if self._tree_slot[slot] != IN_PRIOR]
         tied = gtsam.NonlinearFactorGraph(factors)
+        for factor in replaced.values():
+            tied.add(factor)
         tied.add(_auxiliary_factor(newest))
         if self._auxiliary_slot is None:
             values.insert(AUXILIARY_POSE, values.atPose3(newest[0]))
@@ -80,11 +84,19 @@ class MarginalizedISAM2:
         for slot in removed:
             self._graph.remove(slot)
             self._tree_slot[slot] = IN_PRIOR
+        for (slot, factor), place in zip(replaced.items(), new[factors.size() :], strict=True):
+            self._graph.replace(slot, factor)
+            self._tree_slot[slot] = place
+        del new[factors.size() :]
         slots = range(len(self._tree_slot), len(self._tree_slot) + len(new))
         self._graph.push_back(factors)
         self._tree_slot += new
         self._frame += frames
         return slots
+
+    def in_tree(self, slot: int) -> bool:
+        """False for a factor that is in the linear prior or was removed."""
+        return self._tree_slot[slot] != IN_PRIOR
 
     def relinearize(self) -> int:
         """Relinearize variables beyond their thresholds; return their number. Raises IndeterminateSystemError."""

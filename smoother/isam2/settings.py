@@ -46,6 +46,8 @@ class ISAM2Settings:
     relinearized"""
     recent_frames: int = 10
     """frames since its last observation up to which a variable is recent"""
+    weights_at_estimate: bool = False
+    """whether kernel weights in the tree are from residuals at the estimate (`kernel_weights`), or by GTSAM"""
     initialization: InitializationCriterion = field(default_factory=InitializationCriterion)
     relinearize_at_end: bool = True
     """whether Gauss-Newton steps over the whole graph follow the last frame"""
@@ -82,7 +84,9 @@ class ISAM2Settings:
         """
         if problem.imu is None:
             return cls()
-        inertial = cls(relinearize_skip=5, relinearize_all_skip=20, tree_frames=100, kept_frames=40)
+        inertial = cls(
+            relinearize_skip=5, relinearize_all_skip=20, tree_frames=100, kept_frames=40, weights_at_estimate=True
+        )
         if not problem.sequence.monocular:
             return inertial
         parallax = InitializationCriterion(max_relative_deviation=PARALLAX_SUFFICES)

@@ -11,6 +11,7 @@ from fgbaseline.data.formats import attach_truth, read, write_tum
 from fgbaseline.data.formats.ground_truth import match_stamps
 from fgbaseline.geometry import InputError, se3
 
+from ..builders.inertial_paths import inertial_recording, turn
 from ..builders.synthetic import drive
 from ..builders.trajectory_writers import Path3D, tum
 
@@ -48,6 +49,24 @@ def test_every_way_of_writing_the_same_truth(tmp_path, recorded, body, form):
     assert again.truth is not None
     np.testing.assert_array_equal(again.truth.world_T_imu, truth.world_T_imu)
     assert (again.truth.source, again.remarks) == (str(path), ())
+
+
+@pytest.mark.parametrize("body", ["camera", "imu"])
+def test_the_up_that_a_truth_file_states_is_that_of_the_recording(tmp_path, recorded, body):
+    sequence, world_T_imu = recorded
+    elsewhere, up = se3.exp([40.0, -5, 6, 1.0, 0.2, -2.0]), np.array([0.6, 0.0, 0.8])
+    poses = world_T_imu if body == "imu" else world_T_imu @ sequence.imu_T_cam
+    write_tum(tmp_path / "truth", sequence.t, elsewhere @ poses, elsewhere[:3, :3] @ up)
+    np.testing.assert_allclose(attach_truth(sequence, tmp_path / "truth", body).up, up, atol=1e-12)
+
+
+def test_the_up_that_a_truth_file_states_is_that_of_its_world_with_raw_samples(tmp_path):
+    sequence = inertial_recording(turn, n_frames=12)
+    up = np.array([0.6, 0.0, 0.8])
+    write_tum(tmp_path / "truth", sequence.t, sequence.truth.world_T_imu, up)
+    write_tum(tmp_path / "bare", sequence.t, sequence.truth.world_T_imu)
+    np.testing.assert_array_equal(attach_truth(sequence, tmp_path / "truth", "imu").truth.up, up)
+    assert attach_truth(sequence, tmp_path / "bare", "imu").truth.up is None
 
 
 def test_frames_beyond_the_end_of_a_kitti_file_are_counted(tmp_path, recorded):

@@ -115,6 +115,18 @@ def test_triangulated_tracks_are_where_scipy_finds_the_least_cost(huber: float |
         assert np.sqrt(slope @ np.linalg.solve(curvature, slope)) < 1e-5
 
 
+def test_weights_are_the_kernels_of_the_residuals_and_one_behind_a_camera() -> None:
+    track = Track(0, wrong=4)
+    model = MeasurementModel(CAMERA, Track.variance, HuberKernel(2.5))
+    points = np.tile(track.point, (6, 1))
+    expected = np.minimum(1.0, 2.5 / np.linalg.norm(track.whitened(track.point), axis=1))
+    assert expected[4] < 0.3
+    np.testing.assert_allclose(model.weight_at(track.world_T_cam, points, track.pixel), expected, rtol=1e-12)
+    np.testing.assert_allclose(model.weight_at(track.world_T_cam[4], points[4:5], track.pixel[4:5]), expected[4:5])
+    behind = np.array([[1.0, 0.5, -3.0]])
+    np.testing.assert_array_equal(model.weight_at(track.world_T_cam[0], behind, track.pixel[:1]), 1.0)
+
+
 def test_the_kernel_keeps_one_wrong_match_from_moving_the_point() -> None:
     tracks = [Track(seed, wrong=4) for seed in range(12)]
     clean = [Track(seed) for seed in range(12)]
