@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.estimate import Event, EventKind, Innovations
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry import FloatArray, se3, so3
 from fgbaseline.geometry.linearization import predict
 from fgbaseline.geometry.measurement_model import back_projected
 
@@ -15,19 +15,16 @@ from ..motion_model import POSE, MotionModel, motion_model
 from .feature_selection import select_features
 from .gating import GatedObservations, gate_observations
 from .gyro_bias import BiasedVelocityMotion
-from .inverse_depth_prior import inverse_depths, scene_depth
+from .inverse_depth_prior import common_change, inverse_depths, scene_depth
 from .landmark_map import LandmarkMap
 from .landmark_representation import LandmarkRepresentation, chart, coordinates_of, homogeneous
 from .process_noise import MAX_REJECTED, ProcessNoise
-from .second_order import second_order_of
+from .second_order import second_order, second_order_of
 from .settings import JointSettings, Linearization
 from .state import ABSENT, CommonError, JointState
+from .unknown_depths import MIN_COSINE, UnknownDepths, observed_depths
 from .unobservable_directions import first_estimate_transition, transform_columns
 from .update import CholeskyFactor, Innovation, NotPositiveDefiniteError, StackedJacobian, kalman_update
-
-MIN_COSINE = 0.05
-"""Smallest cosine between optical axis and ray (87 degrees): below it a landmark counts as behind the camera. At the
-camera plane the Jacobian is unbounded."""
 
 
 class _LinearizedObservations(NamedTuple):
@@ -61,7 +58,11 @@ class JointFilter:
         self.motion: MotionModel = motion_model(problem)
         if settings.gyro_bias is not None:
             self.motion = BiasedVelocityMotion(problem, settings.gyro_bias)
-        self.state = JointState(self.motion.start, self.motion.covariance, m)
+        self.state = JointState(self.motion.start, self.motion.covariance, m, problem.n_frames)
+        self.depths: UnknownDepths | None = None
+        """with one camera and `Linearization.INVARIANT`, the landmarks of unknown depth"""
+        if self.measurement.monocular and settings.linearization is Linearization.INVARIANT:
+            self.depths = UnknownDepths(m)
         self.used: BoolArray = np.zeros(len(o), dtype=np.bool_)
         self.map = LandmarkMap(m)
         self.n_deferred = 0
@@ -77,7 +78,7 @@ class JointFilter:
         self.map.last_seen[row] = k
         self._marginalize_unseen(k - self.settings.unseen_frames)
         if self.process_noise.n_rejected >= MAX_REJECTED:
-            self._marginalize(self.state.feature.copy())
+            self._marginalize(self.state.landmarks)
             self.process_noise.reset()
         if k > 0:
             self._predict(k)
@@ -95,10 +96,14 @@ class JointFilter:
         selected = self._select(k, index, wanted)
         if selected.any():
             self._initialize_from_observation(index[selected])
+            if self.depths is not None:
+                self.depths.begin(k, self.state, row[selected], self.imu_T_cam[:3, 3])
+        if self.depths is not None:
+            self.depths.release(self.state)
 
     def finish(self) -> None:
         """Marginalize all remaining landmarks into the map after the last frame."""
-        self._marginalize(self.state.feature.copy())
+        self._marginalize(self.state.landmarks)
         self.events += self.map.undetermined_events(self.problem.features)
 
     def _select(self, k: int, index: IntArray, wanted: BoolArray) -> BoolArray:
@@ -141,6 +146,10 @@ class JointFilter:
         variance = self._variance(linearized)
         innovation = Innovation.of(linearized.H, linearized.residual, state.P)
         gated = self._gate(innovation.nis_per_observation(variance))
+        mean = np.zeros(state.size)
+        if self.depths is not None:
+            linearized, variance, mean = self._at_observed_depths(self.depths, linearized, variance, gated)
+            innovation = Innovation.of(linearized.H, linearized.residual, state.P)
         order = gated.order
         unordered, innovation = innovation, innovation.in_order(order)
         factor = self._record_nis(k, innovation, variance[order])
@@ -157,7 +166,7 @@ class JointFilter:
         variance = variance[order]
         if gated.rejection is not None:
             self._record_rejection(k, gated.rejection, ~gated.accepted)
-            if not gated.accepted.any():
+            if not gated.accepted.any():  # and no landmark has been moved
                 return gated.rejection is not EventKind.FRAME_DISAGREES
         try:
             weight = gated.weight[order][: np.count_nonzero(gated.accepted), None]
@@ -168,10 +177,15 @@ class JointFilter:
                 lower = weight[:, 0] != 1.0
                 added = variance[lower] / weight[lower] - variance[lower]
                 factor = factor.reweighted(innovation.residual, added)
-            self._apply_correction(kalman_update(innovation, factor, state.P))
+            correction = mean + kalman_update(innovation, factor, state.P)
         except NotPositiveDefiniteError:
             self._record_rejection(k, EventKind.COVARIANCE_LOST, gated.accepted)
+            self._apply_correction(mean)
             return False
+        before = state.xi[:, 2].copy()
+        self._apply_correction(correction)
+        if self.depths is not None:  # errors of inverse depths are in proportion to the scale
+            state.scale_inverse_depths(state.slot_of[state.landmarks], common_change(before, state))
         self.used[linearized.observed[gated.accepted]] = True
         if not state.P.diagonal().min() >= 0.0:
             negative = "P - W^T W has a negative variance after the update"
@@ -188,6 +202,51 @@ class JointFilter:
             return np.broadcast_to(self.row_variance, linearized.residual.shape)
         terms = second_order_of(self.camera, self.cam_T_imu, self.state, linearized.H.slot)
         return self.row_variance + terms.variance + terms.mean**2
+
+    def _at_observed_depths(
+        self,
+        depths: UnknownDepths,
+        linearized: _LinearizedObservations,
+        variance: FloatArray,
+        gated: GatedObservations,
+    ) -> tuple[_LinearizedObservations, FloatArray, FloatArray]:
+        """Move accepted landmarks of unknown depth to what the frame shows (`observed_depths`), and linearize there.
+
+        The observations are those of the same order, with their variances (n, r), px^2, and the mean (size,) of the
+        error about the estimate that has been moved; residuals are those of the prior.
+        """
+        state, slot = self.state, linearized.H.slot
+        mean = np.zeros(state.size)
+        unknown = gated.accepted & (depths.anchor[self.feature[linearized.observed]] != ABSENT)
+        at = np.flatnonzero(unknown & (state.xi[slot, 2] > 0.0))
+        if len(at) == 0:
+            return linearized, variance, mean
+        own, noise = slot[at], self.row_variance / gated.weight[at, None]
+        measured, before = self.measured[linearized.observed[at]], state.xi[own]
+        found = observed_depths(
+            self.camera,
+            self.cam_T_imu,
+            state.body,
+            state.charts[own],
+            before,
+            state.pose_and_landmark(own),
+            measured,
+            noise,
+        )
+        move, offset = np.zeros(state.size), mean[state.n_body :].reshape(-1, 3)
+        move[state.n_body :].reshape(-1, 3)[own] = found.xi - before
+        self._apply_correction(move)
+        state.scale_inverse_depths(own, found.scale)
+        offset[own] = found.mean
+        moved = self._linearize(linearized.observed)
+        by_mean = moved.H.multiply(mean[:, None]).reshape(moved.residual.shape)
+        terms = second_order(
+            self.camera, self.cam_T_imu, state.pose, state.charts[own], state.xi[own], found.covariance
+        )
+        variance = variance.copy()
+        after = self.row_variance + terms.variance + terms.mean**2
+        variance[at] = np.where(found.found[:, None], after, variance[at])
+        return moved._replace(residual=moved.residual - by_mean), variance, mean
 
     def _inflate_process_noise(
         self, k: int, innovation: Innovation, variance: FloatArray
@@ -245,17 +304,25 @@ class JointFilter:
         """Apply the correction delta (size,) to the state, and for `Linearization.INVARIANT` P <- B P B^T.
 
         B = I + (N+ - N-) A (`unobservable_directions`), with N- before and N+ after the correction, and A = Ad(T-) on
-        the pose's columns. The rows of a landmark in N are its `motion_jacobian`.
+        the pose's columns. The rows of a landmark in N are its `motion_jacobian`. While the depth of a landmark is
+        unknown, its rows have the translation of its anchor in place of the pose's (`unknown_depths`).
         """
         state, n = self.state, self.state.n_body
-        before = state.body
+        before, anchored = state.body, None if self.depths is None else self.depths.anchored(state)
         state.body = before.corrected(delta[:n])
-        steps = delta[n:].reshape(-1, 3)
+        by = delta[n:].reshape(-1, 3)
         if self.settings.linearization is not Linearization.INVARIANT:
-            state.xi[:] += steps
-        else:
-            landmarks = state.correct_landmarks(steps).reshape(-1, POSE) @ se3.adjoint(before.pose)
-            state.transform_covariance(np.concatenate([transform_columns(before, state.body, delta[:n]), landmarks]))
+            state.xi[:] += by
+            return
+        change = state.correct_landmarks(by)
+        columns = change @ se3.adjoint(before.pose)
+        if anchored is not None:  # a rigid motion [v, w] moves an anchor at p by v + w x p
+            own = change[anchored.slot]
+            by_turn = own[:, :, 3:] + own[:, :, :3] @ so3.hat3(anchored.position)
+            columns[anchored.slot] = np.concatenate([np.zeros_like(by_turn), by_turn @ before.pose[:3, :3]], axis=2)
+            state.transform_by_points(anchored.slot, anchored.anchor, own[:, :, :3])
+        body = transform_columns(before, state.body, delta[:n])
+        state.transform_covariance(np.concatenate([body, columns.reshape(-1, POSE)]))
 
     def _initialize_from_prior(self, row: IntArray) -> None:
         prior, n = self.problem.landmark_prior, len(row)
@@ -300,7 +367,7 @@ class JointFilter:
 
     def _marginalize_unseen(self, since: int) -> None:
         """Marginalize the landmarks without an observation from frame `since` on."""
-        active = self.state.feature
+        active = self.state.landmarks
         self._marginalize(active[self.map.last_seen[active] < since])
 
     def _marginalize(self, row: IntArray) -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.data.observations import BoolArray
+from fgbaseline.data.observations import IntArray
 from fgbaseline.data.problem import InverseDepthPrior
 from fgbaseline.geometry import FloatArray, se3
 
@@ -42,19 +42,39 @@ class SceneDepth(NamedTuple):
 def scene_depth(prior: InverseDepthPrior, state: JointState, cam_T_imu: FloatArray) -> SceneDepth:
     """Inverse depth of the known landmarks in front of the camera; without enough of them that of the problem."""
     spread = prior.sigma / prior.mean
-    rho, H_pose, H_xi = inverse_depths(state.pose, cam_T_imu, state.charts, state.xi)
-    sigma = np.sqrt(np.diagonal(state.P)[state.n_body + 2 :: 3])
-    known: BoolArray = (sigma < KNOWN * state.xi[:, 2]) & (rho > 0.0)
-    n = int(np.count_nonzero(known))
+    known = _known(state)
+    rho, H_pose, H_xi = inverse_depths(state.pose, cam_T_imu, state.charts[known], state.xi[known])
+    front = rho > 0.0
+    known, rho, H_pose, H_xi = known[front], rho[front], H_pose[front], H_xi[front]
+    n = len(known)
     if n < MIN_KNOWN:
         return SceneDepth(prior.mean, spread, np.zeros(state.size), UNKNOWN_SCALE**2)
-    share = np.where(known, 1.0 / (n * np.where(known, rho, 1.0)), 0.0)
     slope = np.zeros(state.size)
-    slope[:POSE] = share @ H_pose
-    slope[state.n_body :] = (share[:, None] * H_xi).reshape(-1)
+    slope[:POSE] = (1.0 / (n * rho)) @ H_pose
+    slope[state.n_body :].reshape(-1, 3)[known] = H_xi / (n * rho[:, None])
     covariance = state.P @ slope
-    mean = float(np.exp(np.mean(np.log(rho[known]))))
+    mean = float(np.exp(np.mean(np.log(rho))))
     return SceneDepth(mean, spread, covariance, float(slope @ covariance))
+
+
+def common_change(before: FloatArray, state: JointState) -> float:
+    """Factor by which an update has changed the known inverse depths together; `before` (count,) it.
+
+    Known landmarks count by the square of their relative accuracy; 1 where they are few.
+    """
+    known = _known(state)
+    known = known[before[known] > 0.0]
+    if len(known) < MIN_KNOWN:
+        return 1.0
+    rho = state.xi[known, 2]
+    weight = rho**2 / np.diagonal(state.P)[state.n_body + 3 * known + 2]
+    return float(np.exp(weight @ np.log(rho / before[known]) / weight.sum()))
+
+
+def _known(state: JointState) -> IntArray:
+    """Slots (n,) of the landmarks whose inverse depth is known."""
+    sigma = np.sqrt(np.diagonal(state.P)[state.n_body + 2 :: 3])
+    return np.flatnonzero((sigma < KNOWN * state.xi[:, 2]) & (state.feature < state.n_features))
 
 
 def inverse_depths(

@@ -33,9 +33,7 @@ class SecondOrder(NamedTuple):
 
 def second_order_of(camera: Camera, cam_T_imu: FloatArray, state: JointState, slot: IntArray) -> SecondOrder:
     """Moments for the landmarks of a joint state in the slots (n,)."""
-    own = state.n_body + 3 * slot[:, None] + np.arange(3)
-    at = np.concatenate([np.broadcast_to(np.arange(POSE), (len(slot), POSE)), own], axis=1)
-    covariance = state.P[at[:, :, None], at[:, None, :]]
+    covariance = state.pose_and_landmark(slot)
     return second_order(camera, cam_T_imu, state.pose, state.charts[slot], state.xi[slot], covariance)
 
 

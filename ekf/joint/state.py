@@ -36,14 +36,18 @@ class CommonError(NamedTuple):
 class JointState:
     """Body and active landmarks, with one joint covariance."""
 
-    def __init__(self, body: BodyState, covariance: FloatArray, n_features: int, capacity: int = 64) -> None:
+    def __init__(
+        self, body: BodyState, covariance: FloatArray, n_features: int, n_points: int = 0, capacity: int = 64
+    ) -> None:
+        self.n_features = n_features
         self.body = self.predicted = body
         """`predicted` is the body state before the update of the current frame"""
         self.n_body = len(covariance)
         """dimension of the body's error: offset of the landmarks in the error state"""
         self.count = 0
-        self.slot_of = np.full(n_features, ABSENT, dtype=np.int64)
-        """(m,) slot of each of the problem's features; ABSENT where it is not active"""
+        self.slot_of = np.full(n_features + n_points, ABSENT, dtype=np.int64)
+        """(m + p,) slot of each of the problem's features, then of p points in the world that are no landmarks; ABSENT
+        where it is not active"""
         self._P = np.zeros((self.n_body + 3 * capacity, self.n_body + 3 * capacity))
         self._P[: self.n_body, : self.n_body] = covariance
         self._feature = np.zeros(capacity, dtype=np.int64)
@@ -83,6 +87,11 @@ class JointState:
     def feature(self) -> IntArray:
         """Feature (count,) of each slot, a view."""
         return self._feature[: self.count]
+
+    @property
+    def landmarks(self) -> IntArray:
+        """Features (l,) of the active landmarks."""
+        return self.feature[self.feature < self.n_features]
 
     @property
     def xi(self) -> FloatArray:
@@ -128,6 +137,28 @@ class JointState:
         P[POSE:, :POSE] = P[:POSE, POSE:].T
         turned = pose_block @ own @ pose_block.T
         P[:POSE, :POSE] = 0.5 * (turned + turned.T)
+
+    def transform_by_points(self, slot: IntArray, point: IntArray, by: FloatArray) -> None:
+        """P <- B P B^T, where B adds `by` (n, 3, 3) times the errors in slots `point` (n,) to those in `slot` (n,)."""
+        P, to, of = self.P, self._indices(slot), self._indices(point).reshape(-1, 3)
+        P[to] += (by @ P[of]).reshape(-1, self.size)
+        P[:, to] += np.einsum("snb,nab->sna", P[:, of], by).reshape(self.size, -1)
+
+    def scale_inverse_depths(self, slot: IntArray, by: FloatArray | float) -> None:
+        """Multiply the error of the inverse depths in slots (n,) `by` (n,) or one factor."""
+        at, factor = self.n_body + 3 * slot + 2, np.broadcast_to(by, len(slot))
+        self.P[at] *= factor[:, None]
+        self.P[:, at] *= factor
+
+    def inverse_depth_sigma(self, row: IntArray) -> FloatArray:
+        """Sigma (n,) of the third coordinate of active landmarks `row` (n,)."""
+        return np.asarray(np.sqrt(np.diagonal(self.P)[self.n_body + 3 * self.slot_of[row] + 2]))
+
+    def pose_and_landmark(self, slot: IntArray) -> FloatArray:
+        """Covariances (n, 9, 9) of the errors of the pose and of each landmark in slots (n,)."""
+        own = self.n_body + 3 * slot[:, None] + np.arange(3)
+        at = np.concatenate([np.broadcast_to(np.arange(POSE), (len(slot), POSE)), own], axis=1)
+        return np.asarray(self.P[at[:, :, None], at[:, None, :]])
 
     def initialize(
         self,

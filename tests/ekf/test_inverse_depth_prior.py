@@ -48,7 +48,7 @@ def test_more_landmarks_do_not_narrow_the_scale() -> None:
     before, scene = run.state.size, scene_depth(InverseDepthPrior(0.3, 0.15), run.state, run.cam_T_imu)
     assert scene.spread == 0.5
     assert np.sqrt(scene.variance) < 0.2
-    new = np.flatnonzero(run.state.slot_of < 0)
+    new = np.flatnonzero(run.state.slot_of[: run.state.n_features] < 0)
     index = np.array([np.flatnonzero(run.feature == row)[0] for row in new])
     run._initialize_from_observation(index)  # the law is of this step alone
     state, n = run.state, len(index)
