@@ -43,6 +43,8 @@ class Excluded(IntEnum):
     """point on a moving object"""
     COPIED = 8
     """copy of the previous frame: never tracked"""
+    START = 9
+    """the start in motion of one camera was found with it: it does not count twice"""
 
 
 WRONG_MATCH = (Excluded.ROWS, Excluded.PREDICTION, Excluded.GEOMETRY, Excluded.MOVING)

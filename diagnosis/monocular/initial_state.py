@@ -1,34 +1,31 @@
 """The start of a problem with one camera: attitude, velocity, biases and scale, with their covariance.
 
 A standing start is known without scale: the body neither moves nor turns while the image stands. A start in motion is
-solved over a window that is long enough for the scale. Estimators use the frames of that window again; so that they do
-not count twice, its deviations are multiplied by `LOOSENED`.
+solved over a window that is long enough for the scale. Its tracks count once: every second one finds the start, the
+others are for the estimators.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.data.observations import IntArray
+from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import InverseDepthPrior, NoiseSettings
 from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3
 
-from ..inertial_initialization.initial_state import Start, standing_states, start_of
+from ..inertial_initialization.initial_state import NO_POSES, Start, standing_states, start_of
 from ..inertial_initialization.least_squares import solve_least_squares
 from ..inertial_initialization.states import RelativePoses
 from ..inertial_initialization.stationary import keyframes_of, standing_frames, stands
 from .initialization_window import Rest, Window, moving_window
+from .window_tracks import every_second_track
 
 LONGEST_STAND = 10.0
 """s that are used of a standing start: without points nothing else holds the path"""
 STANDING_POSITION, STANDING_ROTATION = 5e-3, 4e-3
 """m and rad, by which a standing body moves and turns"""
-LOOSENED = 2.0
-"""factor of the deviations of a start in motion: what it says then counts a quarter. Larger factors make filters less
-consistent: what is linear within the errors is not within what is claimed"""
 EXCITED = 0.1
 """relative 1-sigma of the scale above which the motion does not excite the scale"""
 UNKNOWN_DEPTHS = InverseDepthPrior(0.25, 0.25)
@@ -46,6 +43,8 @@ class MonocularStart(NamedTuple):
     """None where no window has a solution"""
     remark: str
     """sentence on the accuracy of the scale, without its full stop"""
+    used: BoolArray
+    """(n,) mask of the observations that a start in motion was found with; estimators do not use them again"""
 
     def path(self, n_frames: int) -> FloatArray:
         """Poses (T, 4, 4) of the window and of frame 0, NaN elsewhere."""
@@ -66,15 +65,16 @@ def monocular_start(sequence: Sequence, imu: ImuIntervals) -> MonocularStart:
     """The start of a recording with one camera. Raises ValueError with the reason where there is none."""
     frames = standing_frames(sequence, LONGEST_STAND)
     rest = _rest(sequence, imu, frames) if stands(sequence, frames) else None
+    none = np.zeros(len(sequence.observations), dtype=np.bool_)
     try:
         window = moving_window(sequence, imu, rest)
     except ValueError as error:
         if rest is None:
             raise ValueError(f"the start of one camera is not found: {error}") from error
         text = f"nothing after the standing start determines the scale: {error}"
-        return MonocularStart(rest.start, NoiseSettings().pixel, UNKNOWN_DEPTHS, None, text)
-    start = _moving_start(window) if rest is None else rest.start
-    return MonocularStart(start, window.pixel, window.depths, window, _scale_remark(window))
+        return MonocularStart(rest.start, NoiseSettings().pixel, UNKNOWN_DEPTHS, None, text, none)
+    start, used = _moving_start(sequence, imu, window) if rest is None else (rest.start, none)
+    return MonocularStart(start, window.pixel, window.depths, window, _scale_remark(window), used)
 
 
 def _scale_remark(window: Window) -> str:
@@ -87,10 +87,23 @@ def _scale_remark(window: Window) -> str:
     )
 
 
-def _moving_start(window: Window) -> Start:
-    source = f"closed form and least squares over tracks and inertial samples of the first {window.span:.2f} s"
-    start = start_of(window.solution, source, 0.0)
-    return start._replace(state=replace(start.state, covariance=start.state.covariance * LOOSENED**2))
+def _moving_start(sequence: Sequence, imu: ImuIntervals, window: Window) -> tuple[Start, BoolArray]:
+    """The start by every second track of the window, and the mask (n,) of their observations in its keyframes.
+
+    A start by all of them would have errors that are those of the observations themselves: estimators that use these
+    again find the two in agreement, and believe both.
+    """
+    o = sequence.observations
+    tracks, used = every_second_track(sequence, window.frames, window.pixel)
+    with np.errstate(all="ignore"):
+        solution = solve_least_squares(window.solution.states, imu, window.frames, NO_POSES, tracks)
+    if not (np.isfinite(solution.covariance).all() and np.isfinite(solution.states.pose).all()):
+        raise ValueError("half of the tracks determine no start")
+    source = (
+        f"closed form and least squares over every second track and the inertial samples of the first "
+        f"{window.span:.2f} s; estimators do not use these {int(used.sum())} of {len(o)} observations again"
+    )
+    return start_of(solution, source, 0.0), used
 
 
 def _rest(sequence: Sequence, imu: ImuIntervals, frames: IntArray) -> Rest:

@@ -28,7 +28,8 @@ LASTING = 16.0
 """s over which the pixel noise is found"""
 KEYFRAMES = 20
 DETERMINED = 0.05
-"""1-sigma of the scale, as a share of it, at which a window is long enough"""
+"""1-sigma of the scale of a start, as a share of it, at which its window is long enough. One in motion has half of the
+window's tracks, and sqrt(2) times its sigma."""
 FIRST_PIXEL = 1.0
 """px, noise of a row in the first solution"""
 SMALLEST_PIXEL = 0.05
@@ -78,7 +79,7 @@ def moving_window(sequence: Sequence, imu: ImuIntervals, rest: Rest | None = Non
             continue
         if best is None or window.solution.scale_sigma < best.solution.scale_sigma:
             best = window
-        if best.solution.scale_sigma <= DETERMINED:
+        if best.solution.scale_sigma <= (DETERMINED if rest is not None else DETERMINED / np.sqrt(2.0)):
             break
     if best is None:
         raise ValueError(reason)

@@ -43,8 +43,10 @@ def monocular_problem(found: InertialDiagnosis, features: int | None) -> Problem
         f"scale: {start.remark}",
     )
     path = start.path(sequence.n_frames)
+    excluded = tracks.excluded.copy()
+    excluded[np.flatnonzero(excluded == Excluded.NO)[start.used]] = Excluded.START
     problem = problem_of(
-        repaired(sequence, tracks), tracks.excluded, features, found.pixel, HuberKernel(), start.start, path, remarks
+        repaired(sequence, tracks), excluded, features, found.pixel, HuberKernel(), start.start, path, remarks
     )
     return replace(
         problem,
@@ -76,6 +78,7 @@ def as_recorded_monocular(
     o = sequence.observations
     excluded = np.zeros(len(o), dtype=np.uint8)
     excluded[o.counts(sequence.n_landmarks)[o.landmark] < SHORTEST] = Excluded.SHORT
+    excluded[(excluded == Excluded.NO) & found.used] = Excluded.START
     remarks = (
         f"not diagnosed: {pixel:g} px is assumed, not estimated from the recording",
         *imu_remarks(sequence),

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fgbaseline.data.observations import IntArray
+from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, se3
 from fgbaseline.geometry.linearization import predict
@@ -36,12 +36,32 @@ class Rays:
 
 def keyframe_tracks(sequence: Sequence, frames: IntArray, sigma: float) -> KeyframeTracks:
     """Tracks with at least `MIN_OBSERVATIONS` of the keyframes `frames` (k,), with `sigma` px of each row."""
+    chosen, place = _in_keyframes(sequence, frames)
+    return _tracks(sequence, chosen, place, sigma)
+
+
+def every_second_track(sequence: Sequence, frames: IntArray, sigma: float) -> tuple[KeyframeTracks, BoolArray]:
+    """Every second of the `keyframe_tracks`, and the mask (n,) of their observations."""
+    chosen, place = _in_keyframes(sequence, frames)
+    track = np.unique(sequence.observations.landmark[chosen], return_inverse=True)[1]
+    chosen = chosen[track % 2 == 0]
+    used = np.zeros(len(sequence.observations), dtype=np.bool_)
+    used[chosen] = True
+    return _tracks(sequence, chosen, place, sigma), used
+
+
+def _in_keyframes(sequence: Sequence, frames: IntArray) -> tuple[IntArray, IntArray]:
+    """Observations (m,) of the tracks with enough of the keyframes, and the number (T,) of each frame among these."""
     o = sequence.observations
     place = np.full(sequence.n_frames, -1, dtype=np.int64)
     place[frames] = np.arange(len(frames))
     chosen = np.flatnonzero(place[o.frame] >= 0)
     _, row, count = np.unique(o.landmark[chosen], return_inverse=True, return_counts=True)
-    chosen = chosen[count[row] >= MIN_OBSERVATIONS]
+    return chosen[count[row] >= MIN_OBSERVATIONS], place
+
+
+def _tracks(sequence: Sequence, chosen: IntArray, place: IntArray, sigma: float) -> KeyframeTracks:
+    o = sequence.observations
     point = np.unique(o.landmark[chosen], return_inverse=True)[1].astype(np.int64)
     model = MeasurementModel(sequence.camera, sigma**2, HuberKernel())
     return KeyframeTracks(model, sequence.imu_T_cam, place[o.frame[chosen]], point, o.pixel[chosen])

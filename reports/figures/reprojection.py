@@ -32,6 +32,7 @@ BANDS: Mapping[str, tuple[str, tuple[Excluded, ...]]] = {
     "feature not chosen": ("#eef1f4", (Excluded.FEATURE_NOT_CHOSEN,)),
     "disparity too small, or track too short": ("#e9e4cf", (Excluded.DISPARITY, Excluded.SHORT)),
     "copied from the previous frame": ("#d9b3e0", (Excluded.COPIED,)),
+    "used for the start": ("#a9d3b5", (Excluded.START,)),
     "wrong match, moved or undetermined": ("#c0392b", WRONG_MATCH),
 }
 """colors of the observations of a frame, and the reasons for exclusion that each stands for; every reason has one"""

@@ -30,6 +30,7 @@ REASONS: Mapping[str, str] = {
     "geometry": "point not determined, or behind a camera",
     "moving": "point moved",
     "copied": "copied from the previous frame",
+    "start": "the start was found with it",
 }
 """why the mask excludes an observation"""
 

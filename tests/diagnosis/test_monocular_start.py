@@ -9,12 +9,13 @@ from scipy.stats import chi2
 from fgbaseline import diagnosis
 from fgbaseline.data import Problem, Sequence
 from fgbaseline.data.imu import ImuSamples
+from fgbaseline.data.problem import Excluded
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 from fgbaseline.diagnosis import AsRecordedSettings
 from fgbaseline.diagnosis.inertial_initialization.states import motions_between
 from fgbaseline.diagnosis.monocular.gyroscope_bias import epipolar_bias
-from fgbaseline.diagnosis.monocular.initial_state import LOOSENED, MonocularStart, monocular_start
+from fgbaseline.diagnosis.monocular.initial_state import MonocularStart, monocular_start
 from fgbaseline.diagnosis.monocular.window_tracks import keyframe_tracks, rays_of
 from fgbaseline.geometry import InputError
 
@@ -48,14 +49,25 @@ def test_the_gyroscope_bias_satisfies_the_epipolar_constraint(recordings: list[S
 def test_the_start_in_motion_is_right_within_its_covariance(recordings: list[Sequence]) -> None:
     found = [started(sequence) for sequence in recordings]
     assert all(start.excited for start in found)
-    values = []
-    for start, sequence in zip(found, recordings, strict=True):
-        state = replace(start.start.state, covariance=start.start.state.covariance / LOOSENED**2)
-        values.append(nees(start.start._replace(state=state), sequence))
+    values = [nees(start.start, sequence) for start, sequence in zip(found, recordings, strict=True)]
     low, high = chi2.ppf([1e-3, 1.0 - 1e-3], FREE * SEEDS) / SEEDS
     assert low < np.mean(values) < high
     pixel = np.array([start.pixel for start in found])
     assert np.abs(pixel / 0.5 - 1.0).max() < 0.15
+
+
+def test_estimators_do_not_use_the_observations_of_the_start_again(recordings: list[Sequence]) -> None:
+    problem, o = diagnosis.calibrated(recordings[0]), recordings[0].observations
+    assert problem.start is not None
+    of_start = problem.excluded == Excluded.START
+    early = problem.sequence.observations.frame <= problem.sequence.observations.frame[of_start].max()
+    tracks = np.unique(problem.sequence.observations.landmark[of_start])
+    assert 0.3 < np.mean(of_start[early]) < 0.6
+    assert f"these {of_start.sum()} of {len(o)} observations" in problem.start.source
+    own = np.isin(problem.sequence.observations.landmark, tracks) & early & (problem.excluded == Excluded.NO)
+    assert np.mean(own[early]) < 0.05  # in the frame that is no keyframe
+    standing = simulate(Simulation(path="drone", duration=8.0, standing=3.0, imu=SimulatedImu(), cameras="left"))
+    assert not (diagnosis.calibrated(standing).excluded == Excluded.START).any()
 
 
 def test_a_standing_start_finds_its_scale_in_the_motion_that_follows() -> None:
