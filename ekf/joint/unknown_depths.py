@@ -33,7 +33,7 @@ FOUND = 0.3
 """share of its first sigma below which the sigma of an inverse depth is due to observations"""
 ITERATIONS = 3
 LARGEST_STEP = 2.0
-"""of ln rho in an iteration"""
+"""largest change of ln rho in an iteration"""
 MIN_COSINE = 0.05
 """Smallest cosine between optical axis and ray (87 degrees): below it a landmark counts as behind the camera. At the
 camera plane the Jacobian is unbounded."""
