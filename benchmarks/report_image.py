@@ -11,7 +11,7 @@ import click
 from playwright.sync_api import sync_playwright
 
 NAMES = (os.environ.get("FGBASELINE_CHROMIUM"), "chromium", "chromium-browser", "google-chrome", "chrome")
-SIZE = {"width": 1400, "height": 1274}
+SIZE = {"width": 1400, "height": 1250}
 FRAME = 40
 """frame of the recording that a section shows: late enough for tracks to have tails"""
 

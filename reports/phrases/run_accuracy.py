@@ -57,7 +57,7 @@ def ate_sentences(run: Run) -> list[str]:
         return [f"There is no ATE: no estimator has a pose where the ground truth ({source}, {coverage}) has one."]
     each = listed(f"{resolved(rmse[name], ate_resolution(run))} m for {name}" for name in known)
     alignment = "SE(3) alignment" if run.problem.imu is None else "alignment in yaw and position"
-    sentences = [f"ATE (RMSE to the ground truth {source}, after {alignment}, over {coverage}): {each}."]
+    sentences = [f"ATE (RMSE to the ground truth ({source}), after {alignment}, over {coverage}): {each}."]
     if run.reference not in known:
         return sentences
     errors = {name: tables[name]["position"].to_numpy() for name in known if run.results[name].ate_common is not None}
