@@ -83,7 +83,7 @@ def hand_held(recording: Recording) -> dict[str, bool]:
     d, faults = faulty(recording)
     return {
         "axes of both velocities": (d.angular.name, d.linear.name) == (faults.angular, faults.linear),
-        "all axes said to be seen": all(d.angular.seen) and all(d.linear.seen),
+        "all axes said to be seen": all(d.angular.determined) and all(d.linear.determined),
     } | bias_and_delay(d, faults)
 
 
@@ -92,9 +92,9 @@ def car(recording: Recording) -> dict[str, bool]:
     d, faults = faulty(recording)
     return {
         "axes of the angular velocity": d.angular.name == faults.angular,
-        "forward axis of the linear velocity": d.linear.seen[0]
+        "forward axis of the linear velocity": d.linear.determined[0]
         and d.linear.name.split(",")[0] == faults.linear.split(",")[0],
-        "y and z said not to be identifiable": not (d.linear.seen[1] or d.linear.seen[2]),
+        "y and z said not to be identifiable": not (d.linear.determined[1] or d.linear.determined[2]),
     } | bias_and_delay(d, faults)
 
 

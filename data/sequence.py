@@ -1,4 +1,4 @@
-"""Recording: velocities or inertial samples, tracks, calibration and, where known, ground truth."""
+"""Recording: body velocities or raw inertial samples, tracks, calibration and optional ground truth."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -29,15 +29,16 @@ ROTATION_TOLERANCE = 1e-6
 class Truth(Displayed):
     """Ground truth: poses, landmarks and inertial states.
 
-    The world is the IMU frame at frame 0. With raw inertial samples it has the axes of the file, and its origin is the
-    first known pose; `diagnosis.calibrated` aligns it with the world of the problem.
+    With body velocities the world is the IMU frame at frame 0. With raw inertial samples the world has the axes of the
+    file and its origin at the first known pose, until `diagnosis.calibrated` aligns it with the world of the problem.
     """
 
     world_T_imu: FloatArray
     """(T, 4, 4); NaN for frames without ground truth"""
     landmarks: FloatArray | None = None
-    """(N, 3) m, one row per landmark of the sequence; NaN where it is not known"""
+    """(N, 3) m in the world, one row per landmark of the sequence; NaN where it is not known"""
     source: str = "in the recording"
+    """where it comes from, for reports"""
     velocity: FloatArray | None = None
     """(T, 3) m/s in world axes, of a recording with raw inertial data; NaN where it is not known"""
     gyroscope_bias: FloatArray | None = None
@@ -45,7 +46,7 @@ class Truth(Displayed):
     accelerometer_bias: FloatArray | None = None
     """(T, 3) m/s^2; NaN where it is not known"""
     up: FloatArray | None = None
-    """(3,) unit vector, opposite to gravity in this world, where the source of the poses defines it"""
+    """(3,) unit vector, opposite to gravity in this world; None where the source of the poses does not define it"""
 
     @property
     def known(self) -> BoolArray:
@@ -56,8 +57,10 @@ class Truth(Displayed):
     def from_any_world(
         poses: FloatArray, landmarks: FloatArray | None = None, source: str = "in the recording"
     ) -> "Truth":
-        """Ground truth from `poses` (T, 4, 4) and `landmarks` (N, 3) in any common world, re-expressed in the IMU at
-        frame 0."""
+        """Ground truth in the IMU frame at frame 0, from `poses` (T, 4, 4) and `landmarks` (N, 3), m, in any one world.
+
+        Raises InputError without a pose for frame 0.
+        """
         if not np.isfinite(poses[0]).all():
             raise InputError(f"the ground truth ({source}) has no pose for frame 0, which defines the world frame")
         origin = se3.inverse(poses[0])
@@ -67,7 +70,7 @@ class Truth(Displayed):
         return Truth(world_T_imu, moved, source)
 
     def transformed(self, new_T_old: FloatArray) -> "Truth":
-        """The truth in another world; `new_T_old` (4, 4) is the pose of the present world in it."""
+        """Truth in another world; `new_T_old` (4, 4) is the pose of the present world in the new one."""
         R = new_T_old[:3, :3]
         return replace(
             self,
@@ -99,7 +102,7 @@ class Sequence(Displayed):
 
     name: str
     t: FloatArray
-    """(T,) time stamps, s, strictly rising"""
+    """(T,) time stamps, s, strictly increasing"""
     linear_velocity: FloatArray
     """(T, 3) m/s in the IMU's frame; (0, 3) with raw inertial samples"""
     angular_velocity: FloatArray
@@ -109,11 +112,12 @@ class Sequence(Displayed):
     """(4, 4) pose of the left camera in the IMU frame"""
     observations: Observations
     n_landmarks: int
+    """number of landmarks N; `observations.landmark` is 0 to N - 1"""
     imu: ImuSamples | None = None
     """raw inertial samples, in place of body velocities"""
     truth: Truth | None = None
     up_imu: FloatArray | None = None
-    """(3,) unit vector pointing up in the IMU frame at frame 0; by default the camera's -y axis"""
+    """(3,) unit vector pointing up, in the IMU frame at frame 0; by default the -y axis of the camera"""
     form: str = "fgbaseline"
     """file format"""
     source: str = ""
@@ -123,7 +127,7 @@ class Sequence(Displayed):
     findings: tuple[Finding, ...] = ()
     """faults of the file that the reader repaired"""
     time_unit_given: bool = False
-    """True if user or image format state the unit of the stamps; the diagnosis then does not test it"""
+    """True if the user or the image format states the unit of the stamps; the diagnosis then does not test it"""
     left_out: tuple[int, ...] = ()
     """increasing indices of file frames left out because their stamp repeats the previous one"""
 
@@ -135,9 +139,8 @@ class Sequence(Displayed):
         for array in (self.t, self.linear_velocity, self.angular_velocity, self.imu_T_cam):
             array.flags.writeable = False
 
-    def __reduce__(
-        self,
-    ) -> tuple[type, tuple[object, ...]]:  # pickle calls the constructor, which makes the arrays read-only
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
+        # pickle then calls the constructor, which makes the arrays read-only
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     @property
@@ -152,7 +155,7 @@ class Sequence(Displayed):
 
     @property
     def stereo_camera(self) -> StereoCamera:
-        """The camera of a recording that must be stereo. Raises FgbaselineError where there is one camera."""
+        """The stereo camera. Raises FgbaselineError if the recording has one camera."""
         return require_stereo(self.camera, "this step")
 
     @property
@@ -193,7 +196,7 @@ class Sequence(Displayed):
         return facts | {f"remark {i}": text for i, text in enumerate(self.remarks, 1)}
 
     def to_frame(self) -> "pd.DataFrame":
-        """Table with a row for each frame: t (s), velocities, number of observations, true pose where it is known.
+        """Table with a row for each frame: t (s), velocities, number of observations and, with ground truth, the pose.
 
         vx, vy, vz (m/s) and wx, wy, wz (rad/s) are body velocities; a recording with raw inertial samples has none.
         The true pose is x, y, z (m), qx, qy, qz, qw of `world_T_imu`.
@@ -220,12 +223,12 @@ class Sequence(Displayed):
         return plot_over_time(panels, self.name)
 
     def with_truth(self, truth: Truth) -> "Sequence":
-        """Recording with its ground truth replaced."""
+        """Copy of the recording with this ground truth."""
         return replace(self, truth=truth)
 
 
 def require_scale(sequence: Sequence) -> None:
-    """Refuses one camera without raw inertial samples: nothing else determines the scale. Raises InputError."""
+    """Raises InputError for one camera without raw inertial samples, as nothing else determines the scale."""
     if sequence.monocular and sequence.imu is None:
         raise InputError(
             "features: with one camera (uR and vR are NaN) only raw inertial samples determine the scale of the "
@@ -234,7 +237,7 @@ def require_scale(sequence: Sequence) -> None:
 
 
 def check_sequence(s: Sequence) -> None:
-    """Checks a sequence. Raises InputError, naming field and value, where estimation is impossible."""
+    """Raises InputError, with field and value, for a sequence that cannot be estimated."""
     T = s.n_frames
     if T < 2:
         raise InputError(f"time_stamps: a sequence needs at least 2 frames, this one has {T}")
@@ -253,7 +256,7 @@ def check_sequence(s: Sequence) -> None:
             f"frame {k} ({float(s.t[k])!r} s)"
         )
     if s.imu_T_cam.shape != (4, 4) or not measurable(s.imu_T_cam).all():
-        raise InputError(f"imu_T_cam: expected finite numbers of shape (4, 4), got {s.imu_T_cam.tolist()}")
+        raise InputError(f"imu_T_cam: expected shape (4, 4) with finite numbers, got {s.imu_T_cam.tolist()}")
     defect = float(so3.orthogonality_error(s.imu_T_cam[:3, :3]))
     if not defect <= ROTATION_TOLERANCE:
         raise InputError(
@@ -272,14 +275,16 @@ def check_sequence(s: Sequence) -> None:
         raise InputError(
             f"features: uR and vR must be NaN for one camera, but row {row} is {s.observations.pixel[row].tolist()}"
         )
-    if len(s.observations) and (
-        s.observations.frame.max() >= T
-        or s.observations.landmark.max() >= s.n_landmarks
-        or s.observations.frame.min() < 0
-    ):
-        raise InputError("features: an observation names a frame or landmark that the sequence does not have")
+    o = s.observations
+    unknown = np.flatnonzero((o.frame < 0) | (o.frame >= T) | (o.landmark >= s.n_landmarks))
+    if len(unknown):
+        i = int(unknown[0])
+        raise InputError(
+            f"features: observation {i} is of landmark {o.landmark[i]} in frame {o.frame[i]}, but the sequence has "
+            f"{s.n_landmarks} landmarks and {T} frames"
+        )
     if s.truth is not None and s.truth.world_T_imu.shape != (T, 4, 4):
-        raise InputError(f"ground_truth: expected shape ({T}, 4, 4), got {s.truth.world_T_imu.shape}")
+        raise InputError(f"ground_truth: expected poses of shape ({T}, 4, 4), got {s.truth.world_T_imu.shape}")
     if s.truth is not None:
         _check_truth(s.truth, T, s.n_landmarks)
 
@@ -289,7 +294,8 @@ def _check_truth(truth: Truth, T: int, n_landmarks: int) -> None:
     if defect.size and defect.max() > ROTATION_TOLERANCE:
         k = int(np.flatnonzero(truth.known)[defect.argmax()])
         raise InputError(
-            f"ground_truth: the pose of frame {k} is not a rigid motion (rotation off by {defect.max():.3g})"
+            f"ground_truth: the pose of frame {k} is not a rigid motion (rotation off by {defect.max():.3g}, allowed "
+            f"{ROTATION_TOLERANCE:g})"
         )
     for name in ("velocity", "gyroscope_bias", "accelerometer_bias"):
         values = getattr(truth, name)
@@ -303,4 +309,4 @@ def _require_finite(name: str, array: FloatArray) -> None:
     finite = measurable(array).all(axis=1)
     if not finite.all():
         k = int(np.argmin(finite))
-        raise InputError(f"{name}: row {k} is not finite, or beyond {LARGEST:g}: {array[k].tolist()}")
+        raise InputError(f"{name}: row {k} has a number that is not finite or exceeds {LARGEST:g}: {array[k].tolist()}")

@@ -1,18 +1,16 @@
 """Measurement model of an observation by a stereo pair or one camera, shared by all estimators.
 
-It has the rows, their noise, whitening and robust weight.
+It defines the rows of an observation, their variances, their whitening and the Huber kernel.
 
 The source paper (docs/glossary.md) measures z = [uL, vL, uR, vR] with variance V each. A rectified pair predicts
-vL = vR = v. The rows (uL, uR, (vL + vR) / 2) with variances (V, V, V/2) therefore have the same likelihood: their sum
-of squared whitened residuals is smaller by (vL - vR)^2 / (2 V), which does not depend on the state.
+vL = vR = v. The rows (uL, uR, (vL + vR) / 2) with variances (V, V, V/2) therefore have the same likelihood up to a
+constant: the sum of squared whitened residuals of the four components is larger by (vL - vR)^2 / (2 V), which does not
+depend on the state. One camera has the rows (uL, vL) with variances (V, V).
 
-One camera has the rows (uL, vL) with variances (V, V).
-
-Likelihoods and costs use these three rows, or two. All four are used by the filter of the source paper without a
-kernel (pose and landmark update), and by reprojection errors in px. A kernel is a function of the whitened norm of the
-three rows. The whitening covariance is that of the residual: R = diag(V, V, V/2) in smoother, triangulation and
-diagnosis, and H Sigma H^T + R, the covariance of the innovation, in a filter. GTSAM's factors have rows and variances
-from here, and prediction and Jacobians of their own.
+Likelihoods and costs use these rows. Two places use the four components: the filter of the source paper without a
+kernel, and reprojection errors in px. A kernel is a function of the whitened norm of the rows. Smoothers, triangulation
+and diagnosis whiten by the noise covariance, R = diag(V, V, V/2); filters whiten by the covariance of the innovation,
+H Sigma H^T + R. GTSAM's factors take rows and variances from here; their prediction and Jacobians are GTSAM's.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +26,7 @@ STEREO_ROWS = ("uL", "uR", "v")
 """components of the measurement vector of a rectified pair, in this order"""
 MONOCULAR_ROWS = ("uL", "v")
 ROW_VARIANCE = np.array([1.0, 1.0, 0.5])
-"""variances of (uL, uR, v), relative to the variance V of one of the four rows"""
+"""variances of (uL, uR, v), relative to the variance V of each of uL, vL, uR, vR"""
 EQUALIZING_SCALE = 1.0 / np.sqrt(ROW_VARIANCE)
 """factors that give residuals of (uL, uR, v) the variance V"""
 
@@ -47,18 +45,17 @@ def mahalanobis_squared(residual: FloatArray, covariance: FloatArray) -> FloatAr
     if residual.shape[1] == 2:
         a, b = covariance[:, 0].T
         x, y = residual.T
-        rest: FloatArray = x * x / a + (y - b / a * x) ** 2 / (covariance[:, 1, 1] - b / a * b)
-        return rest
-    # C = L D L^T written out takes a third of the time of LAPACK, which is called once per matrix.
+        d1, y1 = covariance[:, 1, 1] - b / a * b, y - b / a * x
+        return np.asarray(x * x / a + y1**2 / d1, dtype=np.float64)
+    # C = L D L^T written out takes a third of the time of numpy, which calls LAPACK once per matrix.
     a, b, c = covariance[:, 0].T
     d, e, f = covariance[:, 1, 1], covariance[:, 1, 2], covariance[:, 2, 2]
     x, y, z = residual.T
-    by_a, to_e = b / a, e - c * b / a
-    d1, y1 = d - by_a * b, y - by_a * x
-    by_c, by_e = c / a, to_e / d1
-    d2, y2 = f - by_c * c - by_e * to_e, z - by_c * x - by_e * y1
-    norm: FloatArray = x * x / a + y1 * y1 / d1 + y2 * y2 / d2
-    return norm
+    l21, e1 = b / a, e - c * b / a
+    d1, y1 = d - l21 * b, y - l21 * x
+    l31, l32 = c / a, e1 / d1
+    d2, y2 = f - l31 * c - l32 * e1, z - l31 * x - l32 * y1
+    return np.asarray(x * x / a + y1 * y1 / d1 + y2 * y2 / d2, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +65,7 @@ class HuberKernel:
     threshold: float = 2.5
 
     def weight(self, squared: FloatArray) -> FloatArray:
-        """Weights k / max(norm, k) of squared whitened norms (...): factors on the inverse of the noise covariance."""
+        """Weights k / max(norm, k) of squared whitened norms (...), k the threshold: factors on R^-1."""
         return np.asarray(self.threshold / np.maximum(np.sqrt(squared), self.threshold), dtype=np.float64)
 
     def weighted(self, squared: FloatArray) -> FloatArray:
@@ -91,7 +88,7 @@ class HuberKernel:
     def curvature_correction(self, squared: FloatArray) -> FloatArray:
         """Second-order coefficient c of squared whitened norms (...): 1 / (k norm) beyond k, 0 up to it.
 
-        Half the loss has the Hessian w J^T J - c (w J^T r)(w J^T r)^T for a constant J, w being the weight.
+        With whitened r and constant J, half the `loss` has the Hessian w J^T J - c (w J^T r)(w J^T r)^T, w the weight.
         """
         k = self.threshold
         return np.where(squared > k**2, 1.0 / (k * np.sqrt(np.maximum(squared, k**2))), 0.0)
@@ -108,7 +105,7 @@ class MeasurementModel:
 
     @property
     def monocular(self) -> bool:
-        """Whether the camera is a single one, with the rows uL and vL."""
+        """Whether there is one camera, with the rows uL and vL."""
         return isinstance(self.camera, MonocularCamera)
 
     @property
@@ -174,9 +171,9 @@ class MeasurementModel:
         return self.kernel.terms(squared)
 
     def documented_innovation(self, pixel: FloatArray, predicted: FloatArray) -> "DocumentedInnovation":
-        """Innovation of the filter of the source paper: pixels (n, 4) minus predicted rows (n, 3).
+        """Innovation of the source paper's filter: pixels uL, vL, uR, vR (n, 4) minus predicted rows (n, 3), px.
 
-        It has the paper's four rows without a kernel, and three rows with one, which needs their norm.
+        Without a kernel it has the four components of the paper; with a kernel, the three rows that the kernel weights.
         """
         if self.kernel is None:
             rows = list(PIXEL_ROWS)
@@ -189,12 +186,12 @@ class MeasurementModel:
 
 
 class DocumentedInnovation(NamedTuple):
-    """Innovation of n observations with r rows each, four or three."""
+    """Innovation of n stereo observations with r rows each: 4, or 3 with a kernel."""
 
     residual: FloatArray
     """(n, r) measured minus predicted, px"""
     rows: list[int]
-    """(r,) index into (uL, uR, v) of the prediction of each row"""
+    """(r,) index of the predicted row, in (uL, uR, v), that belongs to each row of the innovation"""
     variance: FloatArray
     """(r,) px^2"""
 

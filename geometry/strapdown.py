@@ -1,17 +1,19 @@
 """Strapdown equations: motion, transition and noise over samples of angular velocity and specific force.
 
-Over a piece of dt seconds with constant angular velocity w and specific force a, both free of bias, with phi = w dt:
+A piece is the interval between neighboring instants of samples and frames. Over a piece of dt seconds with constant
+angular velocity w (rad/s) and specific force a (m/s^2) in the body frame, bias removed, with phi = w dt:
 
     R' = R Exp(phi)
     v' = v + g dt + R J1(phi) a dt              J1 = integral of Exp(s phi) over s from 0 to 1
-    p' = p + v dt + g dt^2 / 2 + R J2(phi) a dt^2    J2 = integral of (1 - s) Exp(s phi)
+    p' = p + v dt + g dt^2 / 2 + R J2(phi) a dt^2    J2 = integral of (1 - s) Exp(s phi) over s from 0 to 1
 
-These are exact for constant w and a (Forster et al., *On-Manifold Preintegration*, IEEE T-RO 2017, equation 26, which
-holds R over a sample, is their limit for short pieces). g is the gravity vector in the world.
+R is world_R_body, v and p are in the world, and g is the gravity vector in the world. The equations are exact for
+constant w and a. Forster et al. (*On-Manifold Preintegration*, IEEE T-RO 2017, section V) hold R constant over a
+sample, the limit for short pieces.
 
-Errors are [translation, rotation, velocity, gyroscope bias, accelerometer bias] (15,): T = T^ Exp(delta) on the right,
-v = v^ + dv, b = b^ + db. Within this module velocity errors are in the axes of the body, `u = R^T dv`: the transition
-then depends on nothing but the samples. `world_axes` takes it to the world.
+The error state is [translation, rotation, velocity, gyroscope bias, accelerometer bias] (15,) in m, rad, m/s, rad/s and
+m/s^2: T = T^ Exp(delta) on the right, v = v^ + dv, b = b^ + db. Transition and noise have velocity errors in body axes,
+`u = R^T dv`, so that they depend on the samples only. `world_axes` converts them to velocity errors in world axes.
 """
 
 import math
@@ -33,7 +35,7 @@ BLOCKS = {
 }
 """blocks of the error state by name, 3 degrees of freedom each"""
 SMALL = 1.0
-"""rad, below which coefficients are taken from their series: the closed forms lose digits there"""
+"""rad; below this angle coefficients are computed from their series, as the closed forms lose digits there"""
 _TERMS = 9
 """terms of the series, enough for double precision"""
 _SERIES = np.array(
@@ -46,11 +48,11 @@ class PreintegratedImu(NamedTuple):
     """Motion over an interval, relative to its first body frame and free of gravity and of the initial velocity."""
 
     rotation: FloatArray
-    """(3, 3) Delta R"""
+    """(3, 3) Delta R, from the last body frame to the first"""
     velocity: FloatArray
-    """(3,) Delta v, m/s"""
+    """(3,) Delta v, m/s, in the first body frame"""
     position: FloatArray
-    """(3,) Delta p, m"""
+    """(3,) Delta p, m, in the first body frame"""
     dt: float
     """s"""
     transition: FloatArray
@@ -60,7 +62,7 @@ class PreintegratedImu(NamedTuple):
 
 
 def _coefficients(angle: FloatArray) -> FloatArray:
-    """f1, f2, f3, f4 (f_m the sum of (-x^2)^k / (2k + m)!) and f2'/x, f3'/x, f4'/x of n angles x: (7, n).
+    """f1, f2, f3, f4 (f_m the sum of (-x^2)^k / (2k + m)!) and f2'/x, f3'/x, f4'/x (' = d/dx) of n angles x: (7, n).
 
     f1 to f4 are sin x / x, (1 - cos x) / x^2, (x - sin x) / x^3 and (x^2 / 2 + cos x - 1) / x^4.
     """
@@ -100,15 +102,15 @@ def _pieces(phi: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]
 def integrate(
     angular_velocity: FloatArray, specific_force: FloatArray, dt: FloatArray, densities: FloatArray
 ) -> PreintegratedImu:
-    """Motion over n consecutive pieces: angular velocities (n, 3), rad/s, and specific forces (n, 3), m/s^2, less bias.
+    """Motion over n pieces, `dt` (n,) s, of angular velocity (n, 3), rad/s, and specific force (n, 3), m/s^2, unbiased.
 
     `densities` (4,): noise density and random walk of the gyroscope (rad/s/sqrt(Hz), rad/s^2/sqrt(Hz)), then of the
-    accelerometer (m/s^2/sqrt(Hz), m/s^3/sqrt(Hz)). White noise is held over a piece, with a variance of
-    density^2 / dt: it acts as a bias of that piece does.
+    accelerometer (m/s^2/sqrt(Hz), m/s^3/sqrt(Hz)). White noise is constant over a piece, with variance
+    density^2 / dt, and acts like a bias of that piece alone.
 
-    The motion that follows a piece has a transition in closed form. So every piece has a matrix G (9, 6), the
-    derivative of the final pose and velocity by its own bias. A constant bias acts through the sum of all G, a step of
-    the random walk after a piece through the sum of the later ones.
+    G (9, 6) of a piece is the derivative of the final pose and velocity w.r.t. the biases during that piece. It is in
+    closed form, as the transition over the later pieces is. The derivative w.r.t. constant biases is the sum of all G;
+    w.r.t. a random-walk step after a piece it is the sum of G over the later pieces.
     """
     n = len(dt)
     rotation, columns = _pieces(angular_velocity * dt[:, None], specific_force)
@@ -118,7 +120,7 @@ def integrate(
         np.matmul(R[i], rotation[i], out=R[i + 1])
     end = R[-1].T.copy()
     columns *= np.repeat(np.stack([dt, dt**2, dt**2, dt**3], axis=1), 3, axis=1)[:, None, :]
-    turned = (end @ R[:-1]) @ columns  # from here on in the axes of the last body frame
+    turned = (end @ R[:-1]) @ columns  # from here on, all vectors are in the last body frame
     J1_dt, J2_dt2, J1_dt_slope, J2_dt2_slope = (turned[:, :, i : i + 3] for i in range(0, 12, 3))
     steps = turned[:, :, :6].reshape(n, 3, 2, 3) @ specific_force[:, None, :, None]
     v = np.cumsum(steps[:, :, 0, 0], axis=0)  # after each piece
@@ -172,9 +174,10 @@ def world_axes(motion: PreintegratedImu, before: FloatArray, after: FloatArray) 
 
 
 def rotated_velocity(matrix: FloatArray, rows: FloatArray, columns: FloatArray) -> FloatArray:
-    """Matrices (..., 15, 15) of error states with velocity errors in other axes, by rotations (..., 3, 3) new_R_old.
+    """Transitions or covariances (..., 15, 15) of error states, with velocity errors in other axes.
 
-    `rows` rotates the errors that the matrix gives, `columns` those that it takes; of a covariance both are the same.
+    `rows` and `columns` (..., 3, 3) are new_R_old for the velocity errors that the matrix outputs (rows) and takes as
+    input (columns). For a covariance both are the same.
     """
     rotated = matrix.copy()
     rotated[..., VELOCITY, :] = rows @ rotated[..., VELOCITY, :]

@@ -2,7 +2,7 @@
 
 The error of a pose X is e = log(X^-1 X_true), the right perturbation [v, w] (m, rad) in the body frame of the estimated
 pose, to which the covariance belongs. No alignment precedes it: estimate and truth agree on the first pose, or with raw
-inertial samples on its position and heading (see `state`).
+inertial samples on its position and heading (see `state_nees`).
 """
 
 import numpy as np
@@ -32,14 +32,14 @@ def body_error(estimate: Estimate, other: Truth | Estimate) -> FloatArray:
 def nees(estimate: Estimate, truth: Truth) -> FloatArray:
     """NEES e^T P^-1 e, shape (n_frames,), with the pose error e = log(X^-1 X_true) of `body_error`.
 
-    Its mean is 6 for a consistent estimator. NaN without truth, pose or positive definite covariance (the first pose
-    is fixed). Bar-Shalom, Li and Kirubarajan (2001), section 5.4.
+    Its mean is 6 for a consistent estimator. NaN without truth, pose or positive definite covariance, as of the first
+    pose, which is fixed. Bar-Shalom, Li and Kirubarajan (2001), section 5.4.
     """
     return nees_table(estimate, truth)["pose"].to_numpy()
 
 
 def nees_table(estimate: Estimate, truth: Truth) -> pd.DataFrame:
-    """NEES by frame of the `pose` (6 degrees of freedom), its `position` and its `rotation` (3 each)."""
+    """NEES of the `pose` (6 degrees of freedom), `position` and `rotation` (3 each), by frame; NaN as in `nees`."""
     table = pd.DataFrame(
         np.nan, index=pd.RangeIndex(len(estimate.world_T_imu), name="frame"), columns=["pose", *PARTS], dtype=np.float64
     )
@@ -56,14 +56,15 @@ def nees_table(estimate: Estimate, truth: Truth) -> pd.DataFrame:
 def sigma_ratio(estimate: Estimate, reference: Estimate) -> pd.DataFrame:
     """Ratio of an estimate's sigma to the reference's, one row per frame: `position` and `rotation`.
 
-    sqrt(tr P / tr P_ref) of the 3x3 blocks, each in its own body frame (the trace does not depend on it). At least 1
-    for a filter against a smoother; below 1 it is overconfident. NaN where either has no positive definite covariance.
+    sqrt(tr P / tr P_ref) of the 3x3 blocks. Each block is in its own body frame, on which a trace does not depend. A
+    consistent filter has at least 1 against a smoother of the same data; below 1 the filter is overconfident. NaN where
+    either has no positive definite covariance.
     """
     table = pd.DataFrame(
         np.nan, index=pd.RangeIndex(len(estimate.world_T_imu), name="frame"), columns=list(PARTS), dtype=np.float64
     )
-    sound = [covariance_state(e) == CovarianceState.POSITIVE_DEFINITE for e in (estimate, reference)]
-    k = np.flatnonzero(sound[0] & sound[1])
+    valid = [covariance_state(e) == CovarianceState.POSITIVE_DEFINITE for e in (estimate, reference)]
+    k = np.flatnonzero(valid[0] & valid[1])
     if estimate.covariance is not None and reference.covariance is not None:
         for name, part in PARTS.items():
             P, P_ref = (np.einsum("tii->t", c[k, part, part]) for c in (estimate.covariance, reference.covariance))

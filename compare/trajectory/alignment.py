@@ -21,7 +21,7 @@ class Align(StrEnum):
     FIRST_POSE = "first-pose"
     """the transformation that maps the first pose of the estimate to that of the reference"""
     YAW = "yaw"
-    """rotation about up and translation, the unobservable directions of visual-inertial estimation"""
+    """rotation about the vertical and translation, the unobservable directions of visual-inertial estimation"""
     SE3 = "se3"
     SIM3 = "sim3"
     """scale as well, for a monocular camera"""
@@ -34,9 +34,9 @@ _CAPTIONS = {
     Align.SE3: "SE(3)-aligned",
     Align.SIM3: "Sim(3)-aligned",
 }
-EVERY_ROTATION = "every rotation"
-SCALE = "scale"
-YAW = "yaw"
+ROTATION = "the rotation"
+SCALE = "the scale"
+YAW = "the yaw"
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -51,10 +51,10 @@ class Alignment(Displayed):
     scale: float = 1.0
     n: int = 0
     """number of pose pairs used"""
-    of: int = 0
+    available: int = 0
     """number of pose pairs available"""
     free: tuple[str, ...] = ()
-    """undetermined parameters of the positions alone: orientations determine such a rotation; such a scale is 1"""
+    """parameters that the positions do not determine: then the rotation is from the orientations, and the scale is 1"""
 
     @property
     def matrix(self) -> FloatArray:
@@ -83,11 +83,13 @@ class Alignment(Displayed):
         """Alignment for a table's caption: 'SE(3)-aligned over all 120 poses'."""
         text = self.method
         if self.kind in (Align.YAW, Align.SE3, Align.SIM3):
-            text += f" over {'all' if self.n == self.of else 'the first'} {plural(self.n, 'pose')}"
+            poses = plural(self.n, "pose")
+            first = "the first pose" if self.n == 1 else f"the first {poses}"
+            text += f" over {f'all {poses}' if self.n == self.available else first}"
         if self.kind is Align.SIM3:
             text += f" (scale {self.scale:.6g})"
         if self.free:
-            text += f"; their positions leave {' and '.join(self.free)} open"
+            text += f"; positions do not determine {' and '.join(self.free)}"
         return text
 
 
@@ -99,15 +101,16 @@ def align(
     first: int | None = None,
     up: ArrayLike = (0.0, 0.0, 1.0),
 ) -> Alignment:
-    """Transformation of this kind that aligns paired positions of poses (n, 4, 4) to the reference's (n, 4, 4).
+    """Alignment of poses `estimate` (n, 4, 4) to the paired poses `reference` (n, 4, 4), in m, by a group `kind`.
 
-    Least squares in closed form (Umeyama, 1991; for yaw Zhang and Scaramuzza, 2018), never a reflection, over the
-    `first` pairs or all; m. `up` (3,) points up in the reference's world, for yaw.
+    It minimizes the squared position differences over the `first` pairs (default: all) in closed form, without
+    reflections (Umeyama, 1991; for yaw Zhang and Scaramuzza, 2018). `up` (3,) points up in the reference's world; only
+    yaw uses it.
 
-    Positions on a line, in one point or in a plane may leave a rotation undetermined. Of the equally good ones, that
-    whose orientations are nearest to the reference's is taken, in whatever frame the trajectories are given.
+    Positions in one point, on a line or in a plane may not determine the rotation. Of the rotations with equal cost,
+    the one that brings the orientations nearest to the reference's is taken; it does not depend on the world frames.
 
-    Raises InputError for an unknown kind or a `first` that is not between 1 and n, and FgbaselineError without pairs.
+    Raises InputError for an unknown kind or a `first` outside 1 to n, and FgbaselineError without pairs.
     """
     try:
         kind = Align(kind)
@@ -118,9 +121,9 @@ def align(
         raise FgbaselineError(f"alignment needs paired poses, got {estimate.shape} and {reference.shape}")
     n = len(estimate)
     if first is not None and not 1 <= first <= n:
-        raise InputError(f"alignment: there are {n} pairs of poses, the first {first} cannot be taken")
+        raise InputError(f"alignment: it was to use the first {first} pose pairs, expected a number from 1 to {n}")
     if kind is Align.NONE:
-        return Alignment(n=0, of=n)
+        return Alignment(n=0, available=n)
     used = 1 if kind is Align.FIRST_POSE else (first or n)
     source, target = estimate[:used], reference[:used]
 
@@ -134,7 +137,7 @@ def align(
 
 
 def _side_by_side(poses: FloatArray) -> FloatArray:
-    """Rotations of poses (n, 4, 4) side by side (3, 3n): for two of these, A @ B.T is the sum of R_a R_b^T."""
+    """Rotations of poses (n, 4, 4) side by side (3, 3n), so that A @ B.T is the sum of R_a R_b^T."""
     return poses[:, :3, :3].transpose(1, 0, 2).reshape(3, -1)
 
 
@@ -146,9 +149,9 @@ def _fitted(
     up: FloatArray,
     n: int,
 ) -> Alignment:
-    """Least-squares alignment of positions `source` (m, 3) to `target` (m, 3), of n available pairs.
+    """Least-squares alignment of positions `source` (m, 3) to `target` (m, 3), m of n available pairs.
 
-    `orientation_moment` gives the sum of R_target R_source^T, which decides where positions do not.
+    `orientation_moment` gives the sum of R_target R_source^T, for a rotation that the positions do not determine.
     """
     source, target = np.ascontiguousarray(source), np.ascontiguousarray(target)
     center, goal = source.mean(axis=0), target.mean(axis=0)
@@ -176,15 +179,15 @@ def _free_rotation(axis: FloatArray | None) -> tuple[str, ...]:
     if axis is None:
         return ()
     if not axis.any():
-        return (EVERY_ROTATION,)
+        return (ROTATION,)
     return (f"the rotation about ({axis[0]:.3f}, {axis[1]:.3f}, {axis[2]:.3f})",)
 
 
 def align_se3(positions: FloatArray, reference: FloatArray) -> FloatArray:
     """SE(3) alignment `reference_T_estimate` (4, 4) of paired positions (n, 3), m, in the least-squares sense.
 
-    As `align`, but without orientations: undetermined directions take the smallest of the equally good rotations.
-    Raises FgbaselineError for no pairs or NaN.
+    Without orientations, the smallest of the rotations with equal cost is taken where the positions do not determine
+    it. Raises FgbaselineError without pairs and for positions that are not finite.
     """
     if len(positions) == 0 or positions.shape != reference.shape:
         raise FgbaselineError(f"alignment needs paired positions, got {positions.shape} and {reference.shape}")

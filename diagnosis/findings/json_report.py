@@ -94,7 +94,7 @@ def _interval_name(shift: float) -> str:
 def _axes(axes: Axes, fitted: bool) -> dict[str, Any]:
     return {
         "convention": axes.name,
-        "identifiable": list(axes.seen),
+        "identifiable": list(axes.determined),
         "lead": axes.margin if fitted else np.nan,
         "median_error_before": axes.before,
         "median_error_after": axes.after,

@@ -141,7 +141,7 @@ def _axes(which: str, axes: Axes, unit: str) -> Finding:
         what = f"Components {listed(f'{letter}_{axis}' for axis in reversed_)} are recorded with the opposite sign"
     else:
         what = f"The {which} velocity is recorded in other axes: the IMU axes of imu_T_cam are its ({axes.name})"
-    unseen = [name for name, seen in zip("xyz", axes.seen, strict=True) if not seen]
+    unseen = [name for name, seen in zip("xyz", axes.determined, strict=True) if not seen]
     part = f"; that of {listed(unseen)} is a guess, the cameras do not determine it" if unseen else ""
     return Finding(
         f"{which}_axes",
@@ -261,7 +261,7 @@ def _disparity_offset(diagnosis: Diagnosis) -> Finding | None:
 
 
 def _unseen(what: str, axes: Axes) -> str:
-    unseen = [name for name, seen in zip("xyz", axes.seen, strict=True) if not seen]
+    unseen = [name for name, seen in zip("xyz", axes.determined, strict=True) if not seen]
     if not unseen:
         return ""
     if len(unseen) == 3:

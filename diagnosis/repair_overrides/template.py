@@ -71,7 +71,7 @@ def _lines(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _seen(axes: Axes) -> str:
-    seen = [name for name, is_seen in zip("xyz", axes.seen, strict=True) if is_seen]
+    seen = [name for name, is_seen in zip("xyz", axes.determined, strict=True) if is_seen]
     return "all axes are seen" if len(seen) == 3 else f"seen by the cameras: {', '.join(seen) or 'none'}"
 
 

@@ -16,7 +16,7 @@ from ..results.json_files import SUMMARY
 from ..results.reader import RunFolder
 from ..run.problem import RunSettings, build_problem, hold_out_tracks
 
-NO_REFERENCE = "the run has no reference: none of its estimators succeeded; run it again"
+NO_REFERENCE = "the run has no reference: none of its estimators succeeded; repeat the run"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -112,7 +112,7 @@ def load_problem(settings: Settings, run: ReferenceRun | None) -> tuple[Problem 
         wanted = _settings_of(run, sequence)
         if settings.held_out not in (0.0, wanted.held_out):
             raise InputError(
-                f"held-out: {run.name} was run with {wanted.held_out:g}; leave out --held-out, or run it again"
+                f"held-out: {run.name} was run with {wanted.held_out:g}; leave out --held-out, or repeat the run"
             )
     kept, held = hold_out_tracks(recorded, wanted)
     return build_problem(kept, wanted), held

@@ -139,7 +139,7 @@ def of_comparison_folder(folder: Path) -> ComparisonData:
             return _of_files(files, summary)
         except (KeyError, TypeError, ValueError, AttributeError, StopIteration) as error:
             raise InputError(
-                f"it is not that of a comparison ({type(error).__name__}: {error}); run it again"
+                f"it is not that of a comparison ({type(error).__name__}: {error}); repeat the comparison"
             ) from error
 
 

@@ -91,7 +91,7 @@ def conventions(diagnosis: Diagnosis) -> Figure:
                 label.set_fontweight("bold")
         panel.invert_yaxis()
         panel.grid(axis="y", visible=False)
-        unseen = [n for n, s in zip("xyz", axes.seen, strict=True) if not s]
+        unseen = [n for n, s in zip("xyz", axes.determined, strict=True) if not s]
         kept = ": as recorded" if axes.name == IDENTITY else ""
         remark = f" ({', '.join(unseen)} not identifiable{kept})" if unseen else ""
         panel.set(title=f"{which} velocity{remark}", xlabel="behind the best, log-likelihood")

@@ -147,7 +147,7 @@ def of_folder(folder: Path) -> RunData:
             raise InputError(f"it is not the summary of a run ({type(error).__name__}: {error})") from error
         names = tuple(name for name, answered in every.items() if answered)
         if not names:
-            raise InputError("none of the run's estimators succeeded, so there is nothing to draw; run it again")
+            raise InputError("none of the run's estimators succeeded, so there is nothing to draw; repeat the run")
     landmarks = {name: files.landmarks(name).position @ axes.T for name in names}
     series = {name: _with_nis_per_row(files.series(name)) for name in names}
     by_depth, t = files.table("map_by_depth"), series[names[0]]["t"].to_numpy(dtype=np.float64)
@@ -174,10 +174,10 @@ def of_folder(folder: Path) -> RunData:
 def _axes(sequence: Mapping[str, Any]) -> FloatArray:
     """Axes (3, 3) as rows: ahead, left and up, from the summary."""
     if "ahead" not in sequence:
-        raise InputError("it was written by an earlier version, which did not say which way is ahead; run it again")
+        raise InputError("it was written by an earlier version, which did not say which way is ahead; repeat the run")
     ahead, up = (np.array(sequence[key], dtype=np.float64) for key in ("ahead", "up"))
     if ahead.shape != (3,) or up.shape != (3,):
-        raise InputError("sequence.ahead and sequence.up must be three numbers each; run it again")
+        raise InputError("sequence.ahead and sequence.up must be three numbers each; repeat the run")
     return np.stack([ahead, np.cross(up, ahead), up])
 
 

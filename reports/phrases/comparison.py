@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, is_insufficient
+from fgbaseline.compare.trajectory.alignment import SCALE
 from fgbaseline.compare.trajectory_comparison.comparison import ASSUMED_UP, Comparison
 from fgbaseline.compare.trajectory_comparison.computation import TILT
 from fgbaseline.compare.trajectory_comparison.sample_sizes import samples
@@ -144,10 +145,10 @@ def _unpaired_poses(comparison: Comparison) -> list[str]:
 
 def _undetermined_alignments(comparison: Comparison) -> list[str]:
     return [
-        f"The positions of {result.name} do not determine {listed(result.matched.alignment.free)} of the alignment; "
-        "the orientations do."
+        f"The positions of {result.name} do not determine {listed(free)} of the alignment; "
+        f"{listed('the scale is set to 1' if each == SCALE else f'{each} is from the orientations' for each in free)}."
         for result in comparison.results.values()
-        if result.matched.alignment.free
+        if (free := result.matched.alignment.free)
     ]
 
 

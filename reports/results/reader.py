@@ -1,4 +1,4 @@
-"""The reader of summary.json (run, bench), comparison.json and baselines, and of the other files of a run's folder."""
+"""Reader of summary.json (run, bench), comparison.json and accuracy baselines, and of the other files of a run."""
 
 import difflib
 import math
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 
 TRUTH = "truth.tum"
 BASELINE = "fgbaseline/baseline/1"
-NO_SUCH_METRIC = "it has no such metric"
+NO_SUCH_METRIC = "the estimator has no such metric"
 NOT_INERTIAL = "the run has no raw inertial data"
 DIGITS = 5
-"""significant ones, of a baseline: what lies beyond differs between processors and libraries"""
+"""significant digits of the values in an accuracy baseline; further digits differ between processors and libraries"""
 NO_METRICS = frozenset({"status", "reason", "notes", "events"})
-"""keys of an estimator beside its metrics (a kind of event that did not occur is not even a zero)"""
+"""keys of an estimator that are not metrics; counts of events are not, as an event that did not occur has no key"""
 DIVERGENCES = frozenset(f"{name}_divergence" for name in ("velocity", "gyroscope_bias", "accelerometer_bias"))
 INERTIAL = DIVERGENCES | {"velocity", "velocity_unaligned", "gyroscope_bias", "accelerometer_bias", "nees_state"}
-"""keys that an estimator has only in a run on raw inertial data"""
+"""first keys of metrics that exist only in a run on raw inertial data"""
 ON_REFERENCE = frozenset({"divergence", "nees_reference", "sigma_ratio", "map"}) | DIVERGENCES
-"""metrics that are measured from the reference"""
+"""first keys of metrics that are measured from the reference"""
 
 
 class _Record(BaseModel):
@@ -41,7 +41,7 @@ class _Record(BaseModel):
 
 
 class SigmaRecord(_Record):
-    """Sigma of the reference itself, m and degrees."""
+    """1-sigma of the poses of the reference by its own covariances, m and degrees."""
 
     position_rmse: float | None = None
     position_final: float | None = None
@@ -49,7 +49,7 @@ class SigmaRecord(_Record):
     rotation_final_deg: float | None = None
 
     def of(self, metric: str) -> float | None:
-        """The sigma in the unit of a metric of `divergence`: that of the last pose for a final one."""
+        """Sigma that a metric of `divergence` is compared with: position or rotation, RMSE or of the last pose."""
         quantity, when = ("rotation", "_deg") if "rotation" in metric else ("position", "")
         part = "final" if ".final" in metric or "_final" in metric else "rmse"
         found: float | None = getattr(self, f"{quantity}_{part}{when}")
@@ -57,27 +57,28 @@ class SigmaRecord(_Record):
 
 
 class ReferenceRecord(_Record):
-    """The reference that divergence is measured from, and the trust in it."""
+    """Reference that divergence is measured from, and the trust in it."""
 
     name: str | None = None
     trust: Literal["trusted", "doubtful", "untrusted"] | None = None
-    """None if the reference is a trajectory of the user, on which no trust is decided"""
+    """None if the reference is a trajectory of the user, whose trust is not assessed"""
     reasons: tuple[str, ...] = ()
     sigma: SigmaRecord | None = None
-    """None where it has no covariances, and in the summaries of older versions"""
+    """None where the reference has no covariances, and in summaries of older versions"""
 
 
 class SequenceRecord(_Record):
-    """The recording."""
+    """Recording."""
 
     name: str = ""
 
 
 class FindingRecord(_Record):
-    """A fault of the recording."""
+    """Finding of the diagnosis: a fault of the recording."""
 
     code: str = ""
     certainty: str = ""
+    """how the repair was determined, such as `data.finding.AS_GIVEN`"""
 
 
 class ProblemRecord(_Record):
@@ -87,19 +88,19 @@ class ProblemRecord(_Record):
 
 
 class MeasuredRun(_Record):
-    """The estimators of one sequence."""
+    """Results of the estimators on one recording, or of the estimates of a comparison."""
 
     reference: ReferenceRecord = ReferenceRecord()
     problem: ProblemRecord = ProblemRecord()
     sequence: SequenceRecord = SequenceRecord()
     estimators: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
     compared: bool = False
-    """trajectories alone, all of whose errors are from the reference"""
+    """True for a comparison of trajectories: its errors are from the reference, except reprojection errors"""
 
     @model_validator(mode="before")
     @classmethod
     def _of_a_comparison(cls, document: Any) -> Any:
-        """Brings `comparison.json` into the form of `summary.json`: estimates are estimators, sequence is a mapping."""
+        """Converts the content of comparison.json to that of summary.json: key `estimators`, sequence as a mapping."""
         if not isinstance(document, dict) or "estimates" not in document:
             return document
         sequence = {"name": document.get("sequence") or ""}
@@ -107,11 +108,11 @@ class MeasuredRun(_Record):
 
     @property
     def guessed_units(self) -> list[str]:
-        """Codes of the units of the recording that were repaired from the data alone."""
+        """Codes of findings on units that were guessed from the data and not given by the user."""
         return [each.code for each in self.problem.findings if each.code in UNITS and each.certainty != AS_GIVEN]
 
     def rests_on_reference(self, metric: str) -> bool:
-        """Whether a metric says nothing where the reference is wrong."""
+        """Whether a metric is measured from the reference, and means nothing if the reference is wrong."""
         first = metric.partition(".")[0]
         return first in ON_REFERENCE or (self.compared and not first.startswith("reprojection"))
 
@@ -122,7 +123,7 @@ class _SuiteSummary(_Record):
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """The content of a summary: one run or several, by name."""
+    """Content of a summary: one run, or several of a bench, by name."""
 
     path: Path
     runs: Mapping[str, MeasuredRun]
@@ -131,11 +132,11 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class RunFolder:
-    """The files of a run or comparison; each method raises InputError where its file is missing or damaged."""
+    """Files of a run or comparison. Methods raise InputError where a required file is missing or damaged."""
 
     folder: Path
     mark: str = SUMMARY
-    """name of the file with its figures"""
+    """name of the summary file: summary.json or comparison.json"""
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -143,34 +144,34 @@ class RunFolder:
         return read_document(self.folder / self.mark)
 
     def trajectory(self, name: str) -> Trajectory:
-        """The path of an estimator."""
+        """Trajectory of an estimator."""
         return read_trajectory(self.folder / "trajectories" / f"{name}.tum", "tum", name=name)
 
     @property
     def truth(self) -> Trajectory | None:
-        """The ground truth; None where the recording has none."""
+        """Ground truth; None where the recording has none."""
         path = self.folder / TRUTH
         return read_trajectory(path, "tum", name="truth") if path.is_file() else None
 
     def landmarks(self, name: str) -> Landmarks:
-        """The landmarks of an estimator."""
+        """Landmarks of an estimator."""
         return read_landmarks(self.folder / "landmarks" / f"{name}.csv")
 
     def series(self, name: str) -> "pd.DataFrame":
-        """One row per frame of an estimator, with its time `t`."""
+        """Series of an estimator, one row per frame with its time `t`, s."""
         path = self.folder / "series" / f"{name}.csv"
         table = _csv(path)
         if table is None or "t" not in table:
-            raise InputError(f"{path}: the file is missing, or has no column t; run it again")
+            raise InputError(f"{path}: the file is missing, or has no column t; repeat the run")
         return table
 
     def table(self, name: str, within: str = "tables") -> "pd.DataFrame | None":
-        """A long table; None where there is none of that name."""
+        """Table `within/name.csv` of the folder; None where the file does not exist."""
         return _csv(self.folder / within / f"{name}.csv")
 
 
 def _csv(path: Path) -> "pd.DataFrame | None":
-    import pandas as pd  # half a second, which a check does without
+    import pandas as pd  # imported here, as `check` does not need it and saves half a second
 
     if not path.is_file():
         return None
@@ -178,18 +179,18 @@ def _csv(path: Path) -> "pd.DataFrame | None":
         try:
             return pd.read_csv(regular_file(path))
         except ValueError as error:
-            raise InputError(f"it is not the table that a run writes ({error}); run it again") from error
+            raise InputError(f"it is not a table as a run writes it ({error}); repeat the run") from error
 
 
 def read_folder(folder: Path) -> Measured:
-    """The content of a folder's summary.json or comparison.json. Raises InputError."""
+    """Content of summary.json or comparison.json in a folder. Raises InputError for a missing or damaged file."""
     return read_measured(document_in(folder))
 
 
 def read_measured(path: Path, document: dict[str, Any] | None = None) -> Measured:
-    """The runs of a summary.json, comparison.json or baseline, from its `document` if that is read already.
+    """Runs of a summary.json, comparison.json or accuracy baseline; `document` is its content if already read.
 
-    Raises InputError naming file and place.
+    Raises InputError, with file and key path, for content that is not one of these.
     """
     document = read_document(path) if document is None else document
     with reading(path):
@@ -202,34 +203,37 @@ def read_measured(path: Path, document: dict[str, Any] | None = None) -> Measure
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             where = ".".join(map(str, first["loc"]))
-            raise InputError(f"{where}: {first['msg'][:1].lower()}{first['msg'][1:]}; write the file anew") from None
+            raise InputError(
+                f"{where}: {first['msg'][:1].lower()}{first['msg'][1:]}; write the file again with fgbaseline"
+            ) from None
     return Measured(path, runs, str(document["schema"]))
 
 
 def failure(estimator: Mapping[str, Any]) -> str | None:
-    """Why an estimator has no answer; None where it has one."""
+    """Why an estimator has no result; None where it has one."""
     if estimator.get("status", "ok") != "failed":
         return None
     return f"the estimator failed: {estimator.get('reason') or 'no reason given'}"
 
 
 def missing_in(estimator: Mapping[str, Any], metric: str) -> int:
-    """Number of errors that the value at a path leaves out because they are missing (NaN)."""
+    """Number of missing errors (NaN) that the metric at a key path leaves out, from the `missing` beside it."""
     found = _at(estimator, f"{metric.rpartition('.')[0]}.missing") if "." in metric else 0
     return found if isinstance(found, int) else 0
 
 
 def has_metric(estimator: Mapping[str, Any], metric: str) -> bool:
-    """Whether a path leads to a number, or to where one is missing: a null at its end or on the way.
+    """Whether a key path is that of a metric, with or without a value.
 
-    What only runs on raw inertial data have is missing in the others.
+    A metric without a value is null, or has a key on its path that is null, or needs raw inertial data that the run did
+    not have.
     """
     found = _at(estimator, metric)
     return found is None or is_inertial_in_other_run(estimator, metric) or _is_number(found)
 
 
 def value_of(estimator: Mapping[str, Any], metric: str) -> tuple[float | None, str]:
-    """The finite number at a path, or None and why there is none."""
+    """Finite number at a key path and an empty text, or None and the reason."""
     if (reason := failure(estimator)) is not None:
         return None, reason
     found = _at(estimator, metric)
@@ -253,9 +257,9 @@ def is_inertial_in_other_run(estimator: Mapping[str, Any], metric: str) -> bool:
 
 
 def sample_of(estimator: Mapping[str, Any], metric: str) -> Mapping[str, float] | None:
-    """The sample of a metric: the `n` and the `coverage` under `samples` with the longest beginning of its path.
+    """Sample size `n` and `coverage` of a metric: the entry of `samples` whose key is the longest prefix of its path.
 
-    None for what is no statistic, such as a count or a time, and for the summaries of versions without samples.
+    None for metrics that are not statistics, such as counts and times, and in summaries of versions without samples.
     """
     samples: Mapping[str, Mapping[str, float]] = estimator.get("samples") or {}
     keys = [key for key in samples if metric == key or metric.startswith(f"{key}.")]
@@ -263,12 +267,12 @@ def sample_of(estimator: Mapping[str, Any], metric: str) -> Mapping[str, float] 
 
 
 def metrics_of(estimator: Mapping[str, Any]) -> list[str]:
-    """The paths of all numbers of an estimator."""
+    """Key paths of all numbers of an estimator."""
     return [path for path, value in _values(estimator).items() if _is_number(value)]
 
 
 def nearest(metric: str, known: list[str]) -> str:
-    """Known metrics that resemble `metric`, as the end of a sentence."""
+    """Known metrics that resemble `metric`, as a list for the end of a sentence."""
     below = [path for path in known if path.startswith(f"{metric}.")]
     near = below or difflib.get_close_matches(metric, known, n=3) or known
     return ", ".join(near[:8]) + (", ..." if len(near) > 8 else "")
@@ -278,19 +282,19 @@ _ABSENT = object()
 
 
 def _at(estimator: Mapping[str, Any], metric: str) -> Any:
-    """The value at a path; None where a null stands on the way, _ABSENT where there is nothing."""
+    """Value at a key path; None if a key on the path is null, _ABSENT if the path does not exist."""
     values = _values(estimator)
     null_above = any(values.get(path, _ABSENT) is None for path in _beginnings(metric))
     return None if null_above else values.get(metric, _ABSENT)
 
 
 def _values(estimator: Mapping[str, Any]) -> dict[str, Any]:
-    """All values by path; keys may have dots in them, such as the '0.5 s' of a relative error."""
+    """Values of all metrics by key path. A key may contain a dot, such as '0.5 s' of a relative error."""
     return {path: value for path, value in leaves(estimator) if path.partition(".")[0] not in NO_METRICS}
 
 
 def _beginnings(metric: str) -> list[str]:
-    """Key path and its prefixes, the longest first."""
+    """A key path and its prefixes, the longest first."""
     return [metric.rsplit(".", n)[0] for n in range(metric.count(".") + 1)]
 
 

@@ -12,16 +12,16 @@ from fgbaseline.geometry.triangulation import triangulate_tracks
 from ..graph.cheirality import in_front
 
 START_TOLERANCE = 1e-3
-"""relative step at which triangulation stops: the graph moves the landmark further than that"""
+"""relative step at which triangulation stops: the first update of the graph moves a landmark further"""
 
 
 @dataclass(frozen=True, slots=True)
 class InitializationCriterion:
-    """Criterion by which the geometry of a landmark counts as determined."""
+    """Criterion for a landmark whose observations determine its position."""
 
     min_observations: int = 3
     max_relative_deviation: float = 0.5
-    """largest standard deviation in any direction, as a share of the distance to the camera"""
+    """bound of the 1-sigma in the worst direction, relative to the distance from the last camera that observed it"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -59,7 +59,7 @@ class UninitializedLandmarks:
         return [(landmark, int(frame[observed[-1]])) for landmark, observed in sorted(self._observed.items())]
 
     def candidates(self, seen: list[int], since: int = 0) -> list[int]:
-        """Landmarks of `seen` with enough observations; observations before frame `since` are dropped."""
+        """Landmarks of `seen` with enough observations, or all with priors. Drops observations before frame `since`."""
         if since > 0:
             for j in seen:
                 self._observed[j] = [i for i in self._observed[j] if self._observations.frame[i] >= since]
@@ -72,10 +72,10 @@ class UninitializedLandmarks:
         return np.unique(self._observations.frame[np.concatenate([self._observed[j] for j in candidates])])
 
     def initialize(self, candidates: list[int], world_T_imu: FloatArray) -> list[NewLandmark]:
-        """Initialize the candidates whose position is determined along the poses (T, 4, 4).
+        """Remove and return the candidates whose position is determined, given the poses (T, 4, 4).
 
-        With the poses fixed, the triangulated landmark must be in front of every camera that saw it, and no direction
-        may have a larger standard deviation than the rule allows.
+        A landmark is triangulated with the poses held fixed. It must be in front of every camera that observed it, and
+        meet `InitializationCriterion.max_relative_deviation`. A landmark with a prior is initialized at its mean.
         """
         if self._problem.landmark_prior is not None:
             return [self._initialize_at_prior(landmark, world_T_imu) for landmark in candidates]
@@ -110,7 +110,7 @@ class UninitializedLandmarks:
     def _triangulate(
         self, index: IntArray, row: IntArray, world_T_cam: FloatArray, n: int
     ) -> tuple[FloatArray, FloatArray]:
-        """Positions (n, 3) and the standard deviation (n,) of the worst-known direction, m; infinite where unknown."""
+        """Positions (n, 3), m, and 1-sigma (n,), m, in the worst direction; infinite where not determined."""
         model, pixel = self._problem.measurement, self._observations.pixel[index]
         points = triangulate_tracks(model, world_T_cam, row, pixel, n, START_TOLERANCE)
         weakest = np.linalg.eigvalsh(points.information)[:, 0]

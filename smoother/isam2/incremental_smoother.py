@@ -1,4 +1,4 @@
-"""Incremental smoother: iSAM2 frame by frame over the recent frames, older ones in a linear prior."""
+"""Incremental smoother: iSAM2 frame by frame, with old frames marginalized into a linear prior."""
 
 import time
 from collections.abc import Collection
@@ -33,10 +33,10 @@ FINAL_UPDATES = 8
 
 
 class FrameLostError(Exception):
-    """Cholesky would lose a frame's observations; QR may keep them."""
+    """The observations of a frame would be dropped with Cholesky factorization; with QR they may be kept."""
 
     def __init__(self, frame: int) -> None:
-        super().__init__(f"Cholesky would lose the observations of frame {frame}")
+        super().__init__(f"Cholesky factorization would drop the observations of frame {frame}")
         self.frame = frame
 
 
@@ -48,7 +48,7 @@ class IncrementalSmoother:
         self._settings = settings
         self.problem = problem
         self._may_lose_frames = settings.qr or problem.landmark_prior is not None
-        """whether a frame without its observations is accepted, as QR would not keep them either"""
+        """True where a frame may lose its observations, as a retry with QR is not possible or would not help"""
         self.builder = GraphBuilder(problem, settings.initialization)
         self._inertial = problem.imu is not None
         self._weighted = settings.weights_at_estimate and problem.kernel is not None
@@ -115,7 +115,7 @@ class IncrementalSmoother:
             self._marginalize_old_frames(k)
 
     def _marginalize_old_frames(self, k: int) -> None:
-        """Marginalize frames before the horizon of continuing tracks, after frame k."""
+        """After frame k, marginalize frames older than `kept_frames` that no continuing track needs."""
         kept = self._settings.kept_frames
         first = min(k + 1 - kept, marginalization_horizon(self.builder.observations, k))
         self._marginalize_at = k + kept
@@ -130,9 +130,9 @@ class IncrementalSmoother:
         self._no_relin_keys = gtsam.KeyList()
 
     def _with_restored_tree(self, update: FrameUpdate) -> FrameUpdate:
-        """Restores the marginalized frames if `update` observes marginalized variables; returns the update to apply.
+        """Restore the marginalized frames if `update` observes marginalized variables; return the update to apply.
 
-        If GTSAM cannot restore them, that is `update` without the landmarks concerned.
+        If GTSAM cannot restore the frames, these landmarks are dropped, and the returned update is without them.
         """
         frame = self.builder.frame
         marginalized = {j for j in update.tracked if self.solver.is_marginalized(self.key[j])}
@@ -159,7 +159,7 @@ class IncrementalSmoother:
         return update.without(marginalized)
 
     def _current_poses(self, frames: IntArray) -> FloatArray:
-        """Poses (n, 4, 4) of frames (n,) by the last solution of the tree; marginalized ones as estimated online."""
+        """Poses world_T_imu (n, 4, 4) of frames (n,): the tree's last estimate, or online ones if marginalized."""
         poses = self.builder.online.world_T_imu[frames]
         for i in np.flatnonzero(frames >= self._first).tolist():
             poses[i] = self.solver.tree.calculateEstimatePose3(pose_key(int(frames[i]))).matrix()
@@ -240,9 +240,10 @@ class IncrementalSmoother:
         return changed_weights(self.builder, self.solver.tree, self.key, np.array(known, dtype=np.int64))
 
     def _relinearization(self, k: int) -> tuple[bool, gtsam.KeyList | None]:
-        """Whether frame k relinearizes, and the older variables, which then keep their linearization points.
+        """Whether the update of frame k relinearizes, and the keys that keep their linearization points in it.
 
-        A landmark that is observed again counts as older until the tree is rebuilt (marginalization or restoration).
+        The keys are those of variables older than `recent_frames`; None where all may be relinearized. A landmark that
+        is observed again counts as older until the tree is rebuilt (marginalization or restoration).
         """
         settings = self._settings
         if self._reinitialization_frames > 0 or k % settings.relinearize_all_skip == 0:
@@ -278,7 +279,7 @@ class IncrementalSmoother:
         )
 
     def release(self) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
-        """Factors in their slots, under the kernel, and the solution, after the last frame; frees the tree."""
+        """Factors in their slots, with the kernel, and the solution after the last frame. The tree is freed."""
         graph, values = self.solver.release()
         observed = [(j, i, slot) for j, slots in self._slots.items() for i, slot in slots.items() if i != PRIOR]
         for j, i, slot in observed if self._weighted else []:

@@ -33,27 +33,29 @@ WRONG: dict[str, Callable[[], Sequence]] = {
     "linear_velocity: expected 3 values for each of the 6": lambda: replace(
         GOOD, linear_velocity=GOOD.linear_velocity[:5]
     ),
-    "angular_velocity: row 2 is not finite": lambda: replace(
+    "angular_velocity: row 2 has a number that is not finite": lambda: replace(
         GOOD, angular_velocity=skewed(GOOD.angular_velocity, (2, 1), np.nan)
     ),
-    "time_stamps: row 5 is not finite": lambda: replace(GOOD, t=skewed(GOOD.t, (5,), np.inf)),
+    "time_stamps: row 5 has a number that is not finite": lambda: replace(GOOD, t=skewed(GOOD.t, (5,), np.inf)),
     "time_stamps: stamps must rise, but frame 4": lambda: replace(GOOD, t=GOOD.t[[0, 1, 2, 3, 3, 5]]),
     "imu_T_cam: its upper left 3x3 is not a rotation": lambda: replace(
         GOOD, imu_T_cam=skewed(GOOD.imu_T_cam, (0, 0), 0.01)
     ),
-    r"imu_T_cam: expected finite numbers of shape \(4, 4\), got": lambda: replace(GOOD, imu_T_cam=GOOD.imu_T_cam[:3]),
+    r"imu_T_cam: expected shape \(4, 4\) with finite numbers, got": lambda: replace(GOOD, imu_T_cam=GOOD.imu_T_cam[:3]),
     "imu_T_cam: its last row is": lambda: replace(GOOD, imu_T_cam=skewed(GOOD.imu_T_cam, (3, 0), 0.5)),
     "b: expected a number above 0 and at most .*, got -0.5": lambda: replace(
         GOOD, camera=StereoCamera(500.0, 500.0, 320.0, 240.0, -0.5)
     ),
-    "features: row 0 is not finite": lambda: replace(GOOD, observations=one_off(pixel=np.nan)),
+    "features: row 0 has a number that is not finite": lambda: replace(GOOD, observations=one_off(pixel=np.nan)),
     r"features: uR and vR must be NaN for one camera, but row 0 is \[1.0, 1.0, 1.0, nan\]": lambda: replace(
         GOOD, camera=left_of(GOOD.camera), observations=one_off(pixel=(1.0, 1.0, 1.0, np.nan))
     ),
-    "names a frame or landmark that the sequence does not have": lambda: replace(GOOD, observations=one_off(frame=6)),
-    "an observation names a frame or landmark": lambda: replace(GOOD, observations=one_off(landmark=12)),
-    "features: an observation names a frame": lambda: replace(GOOD, observations=one_off(frame=-1)),
-    "ground_truth: expected shape .6, 4, 4., got .5, 4, 4.": lambda: GOOD.with_truth(Truth(POSES[:5], POINTS)),
+    "features: observation 0 is of landmark .* in frame 6, but the sequence has 12 landmarks and 6 frames": lambda: (
+        replace(GOOD, observations=one_off(frame=6))
+    ),
+    "features: observation 0 is of landmark 12": lambda: replace(GOOD, observations=one_off(landmark=12)),
+    "features: observation 0 is of landmark .* in frame -1": lambda: replace(GOOD, observations=one_off(frame=-1)),
+    "ground_truth: expected poses of shape .6, 4, 4., got .5, 4, 4.": lambda: GOOD.with_truth(Truth(POSES[:5], POINTS)),
     "ground_truth: the pose of frame 3 is not a rigid motion": lambda: GOOD.with_truth(
         Truth(skewed(POSES, (3, 1, 1), 0.1), POINTS)
     ),

@@ -81,7 +81,7 @@ def test_a_handheld_rig_shows_axes_bias_and_delay(seed: int) -> None:
         time_offset=offset,
     )
     assert (d.angular.name, d.linear.name) == (angular, linear)
-    assert d.angular.seen == d.linear.seen == (True, True, True)
+    assert d.angular.determined == d.linear.determined == (True, True, True)
     assert np.abs(d.gyro_bias - bias).max() < 3.0 * d.gyro_bias_deviation.max()
     assert abs(d.timing.shift - offset) < 0.2 * 0.1
     found = codes(d)
@@ -93,7 +93,7 @@ def test_a_handheld_rig_shows_axes_bias_and_delay(seed: int) -> None:
 def test_a_car_shows_only_which_axis_is_forward() -> None:
     d = diagnosed(duration=40.0, seed=3, angular_axes="x,-y,-z", linear_axes="-y,x,z")
     assert d.linear.name.split(",")[0] == "-y"
-    assert d.linear.seen == (True, False, False)
+    assert d.linear.determined == (True, False, False)
     sentences = " ".join(not_identifiable(d))
     assert "The y and z axes of the linear velocity" in sentences
     assert "its -y is along x of the IMU axes of imu_T_cam, not the order or the signs of the other" in sentences

@@ -192,7 +192,7 @@ def test_a_noisy_forward_speed_is_seen_and_a_delayed_one_too(noise: float) -> No
     recorded = np.roll(seen, 2, axis=0) @ axes_matrix("-y,x,z") + noise * random.normal(size=(800, 3))
     seen = seen + 0.03 * random.normal(size=(800, 3))
     axes = linear_axes(seen, recorded, rate, np.ones(800, dtype=np.bool_), "x,y,z", baseline=0.5)
-    assert axes.seen == (True, False, False)
+    assert axes.determined == (True, False, False)
     assert axes.name.split(",")[0] == "-y"
 
 

@@ -30,7 +30,7 @@ def test_03_has_reversed_rates_a_bias_and_copied_frames(recordings: Callable[[st
     assert {"angular_axes", "gyro_bias", "copied_frames", "disparity_not_positive"} <= set(found)
     assert d.angular.name == "x,-y,-z"
     assert d.linear.name.split(",")[0] == "x"
-    assert d.linear.seen == (True, False, False)
+    assert d.linear.determined == (True, False, False)
     assert np.abs(d.gyro_bias - [-0.009, -0.010, -0.009]).max() < 0.002
     assert found["gyro_bias"].after < found["gyro_bias"].before
     assert int(d.repeated.sum()) == 153
@@ -51,4 +51,4 @@ def test_the_noise_that_was_added_to_0027_is_found(recordings: Callable[[str], P
     assert d.sigmas.angular_velocity == pytest.approx(0.05, rel=0.25)
     assert int(d.repeated.sum()) == 91
     assert not {finding.code for finding in findings_of(d)} & {"angular_axes", "linear_axes"}
-    assert d.linear.seen == (True, False, False)
+    assert d.linear.determined == (True, False, False)
