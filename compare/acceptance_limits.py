@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 EXACT = 12
-"""significant digits of a sum of two values: 0.7 + 0.1 is 0.8, and not a little less"""
+"""significant digits of a bound, so that 0.7 + 0.1 is 0.8 and not 0.7999999999999999"""
 
 
 class Outcome(StrEnum):
@@ -18,7 +18,7 @@ class Outcome(StrEnum):
 
 
 class Better(StrEnum):
-    """Direction of improvement: a value may leave its baseline without limit in it."""
+    """Direction in which a metric improves, and in which it may differ from its baseline without limit."""
 
     LOWER = "lower"
     HIGHER = "higher"

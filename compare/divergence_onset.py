@@ -1,4 +1,4 @@
-"""Onset of divergence: the first frame beyond a threshold from the reference, and suspected errors of tracks there."""
+"""Onset of divergence: first frame beyond a threshold from the reference, and the share of wrong matches around it."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from .estimate_comparison import Result, Run
 
 FAR = 5.0
-"""m, largest threshold"""
+"""m, upper bound of the threshold"""
 FAR_SHARE = 0.01
-"""largest threshold, as a share of the reference path"""
+"""threshold as a share of the length of the reference path, up to `FAR`"""
 AROUND = 1.0
 """s, half width of the interval around the onset in which wrong matches are counted"""
 
@@ -26,14 +26,15 @@ class DivergenceOnset:
 
     frame: int
     seconds: float
+    """s from the first frame"""
     beyond: float
-    """share of the frames from here on, of those with a pose, that are beyond the threshold"""
+    """share of the frames beyond the threshold, of those from `frame` on that have a pose"""
     wrong: float | None
-    """`wrong_share` within `AROUND`; None without a mask"""
+    """`wrong_share` in the frames within `AROUND` of the onset"""
 
 
 def divergence_threshold(result: "Result") -> float:
-    """Position difference (m) at which an estimate has left the reference: 5 m, or 1 % of the path if less."""
+    """Divergence threshold, m: 1 % of the length of the reference path, at most 5 m; 5 m without a path."""
     return min(FAR, FAR_SHARE * path_length(result)) or FAR
 
 
@@ -58,7 +59,7 @@ def divergence_onset(run: "Run", result: "Result") -> DivergenceOnset | None:
 
 
 class MaskShare(NamedTuple):
-    """Observations of the chosen features, and how many of them the mask excluded, for whatever reason."""
+    """Number of observations of the chosen features, and of those that the mask excluded for any reason."""
 
     observations: int
     excluded: int
@@ -73,7 +74,7 @@ def mask_share(problem: Problem) -> MaskShare:
 def wrong_share(problem: Problem, frames: BoolArray) -> float | None:
     """Share of the observations that the mask excluded as `WRONG_MATCH` in frames (T,); None where it excluded none.
 
-    All shares of this module are of the observations of the chosen features.
+    The share is of the observations of the chosen features, as all shares of this module.
     """
     wrong = _suspected(problem)
     there = frames[problem.sequence.observations.frame] & problem.of_chosen_features
@@ -89,7 +90,7 @@ class WorstSecond(NamedTuple):
 
 
 def worst_second(problem: Problem) -> WorstSecond | None:
-    """Second with the largest share of suspected errors (the first of equals); None where the mask excluded none.
+    """Second with the largest share of wrong matches (the first of equals); None where the mask excluded none.
 
     Only seconds that contain a frame are visited, because stamps in wrong units may span billions of seconds.
     """

@@ -16,7 +16,7 @@ from fgbaseline.data.parallel import background_map
 from fgbaseline.geometry import FloatArray
 
 REFERENCES = ("isam2", "batch", "fixed-lag", "joint-ekf", "ekf", "dead-reckoning")
-"""the reference of a run is the first of these that gave an answer"""
+"""the reference of a run is the first of these that succeeded"""
 SAME_GRAPH = ("isam2", "batch")
 """estimators with the same cost function: their divergence compares solvers"""
 NO_REFERENCE = "no estimator succeeded, so there is nothing to compare with"
@@ -33,9 +33,10 @@ class CommonRmse:
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Evidence(Displayed):
-    """Consistency, residuals and map of an estimate; what compares with truth or reference is None without it.
+    """Consistency, residuals and map of an estimate.
 
-    For the reference itself `difference`, `sigma_ratio` and `map` are None too.
+    `error` and `nees` are None without truth; `difference`, `sigma_ratio` and `map` without a reference, and for the
+    reference itself.
     """
 
     covariance: NDArray[np.uint8]
@@ -70,7 +71,7 @@ class Evidence(Displayed):
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class InertialEvidence(Displayed):
-    """Velocity and biases of an estimate from raw inertial data; what compares with truth or reference is None without.
+    """Velocity and biases of an estimate from raw inertial data. Comparisons are None without truth or reference.
 
     For the columns see `compare.velocity_and_bias_errors`.
     """
@@ -78,7 +79,7 @@ class InertialEvidence(Displayed):
     values: pd.DataFrame
     """see `compare.velocity_and_biases`"""
     errors: pd.DataFrame | None
-    """errors from the truth as it is, in the world of the sigmas"""
+    """errors from the truth without alignment, in the world of the sigmas"""
     aligned: pd.DataFrame | None
     """errors from the truth after the alignment of `Result.truth_aligned`"""
     divergence: pd.DataFrame | None
@@ -90,7 +91,7 @@ class InertialEvidence(Displayed):
     def series(self) -> pd.DataFrame:
         """Table of all parts by frame: `velocity_x`, `truth_velocity_x` (unaligned), `divergence_velocity_x`, ...
 
-        Only the columns of values have sigmas beside them, and `nees_state` is that of all 15 components.
+        Sigmas are given once, with the values. `nees_state` is the NEES of all 15 components.
         """
         parts = [self.values]
         for prefix, errors in (("truth", self.errors), ("divergence", self.divergence)):
@@ -107,9 +108,9 @@ class HeldOutReport(Displayed):
 
     held: HeldOut
     errors: compare.HeldOutErrors | None
-    """None where no estimator answered"""
+    """None where no estimator succeeded"""
     ranking: pd.DataFrame
-    """see `compare.held_out_ranking`; empty where no track is left to judge by"""
+    """see `compare.held_out_ranking`; empty where no held-out track can be used"""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -122,7 +123,7 @@ class Result(Displayed):
     divergence: pd.DataFrame | None
     """differences from the reference, one row per frame: see `compare.pose_errors`; None without a reference"""
     truth: pd.DataFrame | None
-    """errors from the truth as it is; None without truth"""
+    """errors from the truth without alignment; None without truth"""
     truth_aligned: pd.DataFrame | None
     """errors from the truth after alignment in yaw and position with raw inertial data, otherwise in SE(3)"""
     evidence: Evidence
@@ -164,7 +165,7 @@ class Run(Displayed):
     reference: str | None
     trust: compare.Trust
     common: BoolArray | None
-    """(n,) mask of the observations that were used by all estimators, those that use none aside"""
+    """(n,) mask of the observations used by all estimators that use any"""
     settings: Mapping[str, object]
     """settings of the user, for the record"""
     held_out: HeldOutReport | None = None
@@ -200,7 +201,7 @@ class Run(Displayed):
 
 
 def reference_among(estimates: Mapping[str, Estimate]) -> str | None:
-    """Name of the reference: the first of `REFERENCES` that gave an answer."""
+    """Name of the reference, the first of `REFERENCES` that succeeded; None if all failed."""
     return next((n for n in REFERENCES if n in estimates and estimates[n].status is not Status.FAILED), None)
 
 

@@ -43,7 +43,7 @@ CRITERIA = {
     "batch_cost": ("negative log-likelihood above that of the batch solution", SHARE),
     "batch_position": ("position RMSE from the batch solution", "baselines"),
 }
-"""name and unit of each criterion, by the field of `TrustLimits` that has its limits; names may hold such a field"""
+"""field of `TrustLimits` -> name and unit of its criterion; `{weak_below}` is replaced by that field"""
 BATCH_CRITERIA = ("batch_cost", "batch_position")
 AT_LEAST = frozenset({"used_share"})
 """criteria whose value must not fall below their limits"""
@@ -267,7 +267,7 @@ def _compared_with_batch(
     remark = "" if problem.sequence.monocular else f"1 baseline: {problem.sequence.camera.unit_length:.3g} m"
     position = _criterion(limit, "batch_position", baselines, remark)
     lengths = f", {baselines:.2g} baselines"
-    if problem.sequence.monocular:  # no baseline, and its stand-in means nothing to a reader
+    if problem.sequence.monocular:  # one camera has no baseline: the unit is UNIT_LENGTH
         position, lengths = replace(position, unit=f"{UNIT_LENGTH:g} m"), ""
     criteria = (_criterion(limit, "batch_cost", excess), position)
     verdict = max(criterion.verdict for criterion in criteria)

@@ -64,13 +64,13 @@ def _inertial(t: FloatArray, inertial: InertialEvidence) -> dict[str, dict[str, 
 
 
 def truth_sample(run: Run) -> Mapping[str, float] | None:
-    """Sample that errors to the truth rest on at best: the frames that have one; None without truth."""
+    """Largest possible sample of errors against the truth, the frames that have one; None without truth."""
     truth = run.problem.sequence.truth
     return _of_frames(run.problem.sequence.t, None if truth is None else truth.known)
 
 
 def insufficient_truth(run: Run) -> bool:
-    """Whether there is a truth, but too little of it to judge by."""
+    """Whether there is ground truth, but for too few frames or too little of the time to judge by."""
     sample = truth_sample(run)
     return sample is not None and compare.is_insufficient(sample, compare.MIN_SAMPLE_SIZE, compare.MIN_COVERAGE)
 

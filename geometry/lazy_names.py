@@ -7,10 +7,11 @@ from typing import Any
 
 
 def lazy_names(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """The `__getattr__` of a package; its `__dir__`, by which editors complete names, is set.
+    """`__getattr__` of a package. Also sets the package's `__dir__`, from which editors complete names.
 
-    `homes` has the names, separated by blanks, by the module that defines them: one below the package, or one of
-    another room in full. Type checkers read the imports under TYPE_CHECKING beside it; a test holds both to each other.
+    `homes` maps a module to the names that it defines, separated by blanks. The module is relative to the package, or
+    absolute if it begins with `fgbaseline.`. Type checkers read the imports under TYPE_CHECKING; a test checks that
+    both have the same names.
     """
     home = {name: module for module, names in homes.items() for name in names.split()}
     own = vars(sys.modules[package])

@@ -36,7 +36,7 @@ class Prediction:
 
     @property
     def depth(self) -> FloatArray:
-        """Homogeneous coordinates z (n,): depths in m where w = 1, as for points given as (n, 3)."""
+        """Coordinates z (n,) of the homogeneous points in the left camera frame: depths in m where w = 1."""
         return np.asarray(1.0 / self.rows.inverse_z, dtype=np.float64)
 
     @property
@@ -52,7 +52,7 @@ class Prediction:
         return np.ascontiguousarray(self.camera.row_derivatives(self.rows, along).transpose(2, 0, 1)).reshape(-1, 4)
 
     def pose_jacobian(self) -> FloatArray:
-        """Jacobian (n, r, 6) w.r.t. the right perturbation [v, w] of world_T_imu: the source paper's H, equation 13.
+        """Jacobian (n, r, 6) w.r.t. the right perturbation [v, w] of world_T_imu, px/m and px/rad (H in equation 13).
 
         T exp(delta) moves the point s in the IMU frame by -hat(delta) s = [-s4 I, hat(s)] delta.
         """
@@ -71,7 +71,7 @@ class Prediction:
 
 
 def predict(camera: Camera, cam_T_imu: FloatArray, world_T_imu: FloatArray, points: FloatArray) -> Prediction:
-    """Predicts the observations of world points, (n, 3) in m or homogeneous (n, 4), from a pose (4, 4)."""
+    """Predicts the observations of world points, (n, 3) in m or homogeneous (n, 4), from a pose world_T_imu."""
     imu_T_world = se3.inverse(world_T_imu)
     if points.shape[1] == 3:  # subtracting first avoids cancellation far from the origin
         s = np.ones((4, len(points)))

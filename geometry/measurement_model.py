@@ -63,6 +63,7 @@ class HuberKernel:
     """Huber loss on the whitened norm of an observation's rows: quadratic up to `threshold` sigmas."""
 
     threshold: float = 2.5
+    """sigmas"""
 
     def weight(self, squared: FloatArray) -> FloatArray:
         """Weights k / max(norm, k) of squared whitened norms (...), k the threshold: factors on R^-1."""
@@ -161,7 +162,7 @@ class MeasurementModel:
         return squared if self.kernel is None else self.kernel.loss(squared)
 
     def curvature_correction(self, squared: FloatArray) -> FloatArray:
-        """Second-order coefficient, see `HuberKernel.curvature_correction`; 0 without a kernel."""
+        """Second-order coefficients (...), see `HuberKernel.curvature_correction`; 0 without a kernel."""
         return np.zeros_like(squared) if self.kernel is None else self.kernel.curvature_correction(squared)
 
     def robust_terms(self, squared: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,8 +1,8 @@
-"""One rectified camera without a second one: pixels [uL, vL] of a point in its frame.
+"""One rectified camera: pixels [uL, vL] of a point in its frame.
 
-It observes the homogeneous point q = (x, y, z, w) at uL = fu x/z + cu, vL = fv y/z + cv: a stereo pair's rows without
-that of the right camera. An observation is written [uL, vL, NaN, NaN]. Nothing in it depends on w, so depth comes from
-motion alone, and scale from inertial samples.
+It observes the homogeneous point q = (x, y, z, w) at uL = fu x/z + cu, vL = fv y/z + cv, the rows of a stereo pair
+without uR. An observation is written [uL, vL, NaN, NaN]. It does not depend on w, so depth comes from motion alone, and
+scale from inertial samples.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from .so3 import FloatArray
 from .stereo_camera import MIN_DEPTH, PredictedRows, StereoCamera
 
 UNIT_LENGTH = 0.1
-"""m, in place of a baseline, as the unit of tolerances: the baseline of a small stereo rig"""
+"""m; unit of the tolerances that are in baselines for a stereo pair: the baseline of a small stereo rig"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +44,16 @@ class MonocularCamera:
 
     def rows(self, q: FloatArray) -> PredictedRows:
         """Rows uL and v of points q (3, ...) or (4, ...) in the camera frame; see `StereoCamera.rows`."""
-        near = 1.0 / q[2]
-        slope = np.stack([q[0] * near, q[1] * near, near if len(q) == 3 else q[3] * near])
-        return PredictedRows(np.stack([self.fu * slope[0] + self.cu, self.fv * slope[1] + self.cv]), slope, near)
+        inverse_z = 1.0 / q[2]
+        x, y = q[0] * inverse_z, q[1] * inverse_z
+        normalized = np.stack([x, y, inverse_z if len(q) == 3 else q[3] * inverse_z])
+        return PredictedRows(np.stack([self.fu * x + self.cu, self.fv * y + self.cv]), normalized, inverse_z)
 
-    def row_derivatives(self, seen: PredictedRows, along: FloatArray) -> FloatArray:
-        """Directional derivatives (2, k, ...) of the rows; see `StereoCamera.row_derivatives`."""
-        x, y, _ = seen.normalized
-        by_u, by_v = self.fu * seen.inverse_z, self.fv * seen.inverse_z
-        return np.stack([by_u * (along[0] - x * along[2]), by_v * (along[1] - y * along[2])])
+    def row_derivatives(self, predicted: PredictedRows, along: FloatArray) -> FloatArray:
+        """Directional derivatives (2, k, ...) of the rows uL and v, px; see `StereoCamera.row_derivatives`."""
+        x, y, _ = predicted.normalized
+        du, dv = self.fu * predicted.inverse_z, self.fv * predicted.inverse_z
+        return np.stack([du * (along[0] - x * along[2]), dv * (along[1] - y * along[2])])
 
     def project(self, points: ArrayLike) -> FloatArray:
         """Pixels uL, vL, NaN, NaN (..., 4) of points (..., 3) in the camera frame, m."""

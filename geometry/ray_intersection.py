@@ -1,7 +1,8 @@
-"""Intersection of the rays of one camera: where points are that it observed from several known poses.
+"""Intersection of the rays of one camera: initial positions of points that it observed from known poses.
 
-The point with the least sum of squared distances from its rays: sum (I - d d^T) (p - c) = 0 for unit directions d and
-camera centers c. It is linear and needs no start, but weighs distances in place of angles.
+A position p has the least sum of squared distances from the rays of its point: sum (I - d d^T) (p - c) = 0 for unit
+directions d and camera centers c. The problem is linear and needs no initial value, but it minimizes distances from
+rays and not errors in the image.
 """
 
 from typing import NamedTuple
@@ -20,17 +21,17 @@ class PointStart(NamedTuple):
     """Initial positions of the m points for which rays determine one."""
 
     place: NDArray[np.int64]
-    """(m,) index of the point"""
+    """(m,) index of the point, 0 to n_points - 1"""
     nearest: NDArray[np.int64]
-    """(m,) observation whose camera is the point's origin"""
+    """(m,) index of the observation whose camera center is the origin of the position"""
     position: FloatArray
-    """(3, m) m, relative to the origin, in the axes of the reference frame"""
+    """(3, m) m, relative to this camera center, in the axes of the reference frame of the poses"""
 
 
 def ray_intersections(
     camera: MonocularCamera, world_T_cam: FloatArray, row: NDArray[np.int64], pixel: FloatArray, n_points: int
 ) -> PointStart:
-    """Intersections in front of the camera of each point's last ray; a point whose rays are parallel has none.
+    """Intersection of the rays of each point; none if they are parallel or it is behind the camera of the last one.
 
     Shapes are those of `triangulation.triangulate_tracks`.
     """

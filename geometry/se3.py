@@ -105,9 +105,10 @@ def inverse(pose: ArrayLike) -> FloatArray:
 
 
 def affine_inverse(matrix: ArrayLike) -> FloatArray:
-    """The inverse (..., 4, 4) of matrices [[A, p], [0, 1]] (..., 4, 4); A need not be a rotation to the last digit.
+    """Inverse (..., 4, 4) of matrices [[A, p], [0, 1]] (..., 4, 4), exact also if A is not exactly a rotation.
 
-    Recorded extrinsics are rotations to 1e-8 only; where landmarks pass near the camera plane that is enough to show.
+    Recorded extrinsics are rotations to about 1e-8. The transpose as the inverse would change residuals of landmarks
+    near the camera plane visibly.
     """
     T = np.asarray(matrix, dtype=np.float64)
     result = np.zeros_like(T)
@@ -131,7 +132,7 @@ def adjoint(pose: ArrayLike) -> FloatArray:
 def right_jacobian(twist: ArrayLike) -> FloatArray:
     """J (..., 6, 6) of twists (..., 6) of any size with exp(xi + d) = exp(xi) exp(J d) for small d.
 
-    The closed form of the sum of (-ad)^n / (n + 1)!: Barfoot (2017), equations 7.77b and 7.86b, at -xi.
+    Closed form of the sum of (-ad)^n / (n + 1)!: Barfoot (2017), equations 7.77b and 7.86b, at -xi.
     """
     xi = -np.asarray(twist, dtype=np.float64)
     V, W = hat3(xi[..., :3]), hat3(xi[..., 3:])

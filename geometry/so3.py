@@ -15,6 +15,7 @@ FloatArray = NDArray[np.float64]
 """Arrays of doubles, of any shape."""
 
 SMALL_ANGLE = 1e-4
+"""rad; below this angle coefficients are computed from their Taylor series"""
 
 
 def hat3(vector: ArrayLike) -> FloatArray:

@@ -73,35 +73,36 @@ class StereoCamera:
 
         Points behind the camera are projected by the same formula, as in the source paper. Divides by zero at z = 0.
         """
-        near = 1.0 / q[2]
-        slope = np.empty((3, *np.shape(near)))
-        np.multiply(q[:2], near, out=slope[:2])
-        slope[2] = near if len(q) == 3 else q[3] * near
-        pixel = np.empty_like(slope)
-        pixel[0] = self.fu * slope[0] + self.cu
-        pixel[1] = pixel[0] - (self.fu * self.baseline) * slope[2]
-        pixel[2] = self.fv * slope[1] + self.cv
-        return PredictedRows(pixel, slope, near)
+        inverse_z = 1.0 / q[2]
+        normalized = np.empty((3, *np.shape(inverse_z)))
+        np.multiply(q[:2], inverse_z, out=normalized[:2])
+        normalized[2] = inverse_z if len(q) == 3 else q[3] * inverse_z
+        pixel = np.empty_like(normalized)
+        pixel[0] = self.fu * normalized[0] + self.cu
+        pixel[1] = pixel[0] - (self.fu * self.baseline) * normalized[2]
+        pixel[2] = self.fv * normalized[1] + self.cv
+        return PredictedRows(pixel, normalized, inverse_z)
 
-    def row_derivatives(self, seen: PredictedRows, along: FloatArray) -> FloatArray:
+    def row_derivatives(self, predicted: PredictedRows, along: FloatArray) -> FloatArray:
         """Directional derivatives (3, k, ...) of the rows along k directions `along` (3 or 4, k, ...), m.
 
         `along[i]` is the derivative of coordinate i of q w.r.t. each of the k parameters. Three coordinates suffice for
         points at a finite distance, where w is constant.
         """
-        x, y, w = seen.normalized
-        near = seen.inverse_z
-        result = np.empty((3, *along.shape[1:]))  # filled in place: the arrays are short and calls are what costs
+        x, y, w = predicted.normalized
+        inverse_z = predicted.inverse_z
+        # filled in place: the arrays are short, so that the number of calls is the cost
+        result = np.empty((3, *along.shape[1:]))
         left, right, v = result
         np.subtract(along[0], np.multiply(x, along[2], out=left), out=left)
-        left *= self.fu * near
+        left *= self.fu * inverse_z
         np.multiply(w, along[2], out=right)
         if len(along) == 4:
             right -= along[3]
-        right *= self.fu * self.baseline * near
+        right *= self.fu * self.baseline * inverse_z
         right += left
         np.subtract(along[1], np.multiply(y, along[2], out=v), out=v)
-        v *= self.fv * near
+        v *= self.fv * inverse_z
         return result
 
     def project(self, points: ArrayLike) -> FloatArray:
@@ -124,7 +125,7 @@ class StereoCamera:
         return np.ascontiguousarray(np.moveaxis(J, (0, 1), (-2, -1)))
 
     def triangulate(self, pixels: ArrayLike) -> FloatArray:
-        """Triangulates pixels (..., 4) to points (..., 3) in the left camera frame, m; height comes from vL alone.
+        """Triangulates pixels (..., 4) to points (..., 3) in the left camera frame, m; y is from vL, vR is not used.
 
         A disparity below zero gives a point behind the camera, one of zero a point at infinity; the caller decides
         whether to use them.

@@ -1,9 +1,9 @@
 """Multi-view triangulation with known poses: damped Gauss-Newton over all tracks at once.
 
-A point is [x/z, y/z, 1/z] in the nearest camera that observed it (inverse depth; Civera et al. 2008). Pixels are linear
-in it in that camera and nearly so in the others, so that Gauss-Newton takes half the steps of a Euclidean point. Each
-point has its own damping and its own convergence test. Each coordinate is a separate array over the observations,
-sorted by point, because stacks of small matrices are several times slower.
+A point is [x/z, y/z, 1/z] in the nearest camera that observed it (inverse depth; Civera et al. 2008). Pixels of that
+camera are linear in these coordinates, and those of the others nearly so: Gauss-Newton takes half the steps that it
+takes with XYZ. Each point has its own damping and its own convergence test. Each coordinate is a separate array over
+the observations, sorted by point, because stacks of small matrices are several times slower.
 """
 
 from typing import NamedTuple
@@ -21,20 +21,20 @@ MAX_ITERATIONS = 30
 STEP_TOLERANCE = 1e-8
 """step at convergence, relative to the distance from the nearest camera that observed the point"""
 NEWTON = 1e-2
-"""Relative step below which the second-order term of the kernel is used. Without it a point with outliers converges
-only linearly; with it far from the minimum the step may point away from it."""
+"""Relative step below which the second-order term of the kernel is used. Without this term a point with outliers
+converges only linearly; far from the minimum, a step with this term may increase the cost."""
 DAMPED = 1.0
-"""damping above which a small step is due to the damping and no sign of convergence"""
+"""damping above which a small step does not count as convergence, as it may be due to the damping"""
 FEWER = 0.5
 """share of unconverged points below which the converged ones are removed from the iteration"""
 LEAST_PIVOT = 1e-12
 """lower bound of a pivot of the information of [x/z, y/z, unit length/z], against rounding"""
 ROUNDING = 1e-14
-"""Decrease of a point's cost by a step, relative to the cost, that drowns in rounding."""
+"""predicted decrease of a point's cost, relative to the cost, up to which it counts as rounding"""
 FARTHER = 0.01
 """smallest factor by which a step may change an inverse depth, so that no step passes infinity"""
 INFINITE = 1e-3
-"""px, disparity in the nearest camera, at a baseline of a unit length, of a point at infinity: its iteration ends"""
+"""px; smallest disparity, for a baseline of `unit_length`: a point that reaches it is at infinity, and is left there"""
 
 
 class Triangulated(NamedTuple):
@@ -49,8 +49,8 @@ class Triangulated(NamedTuple):
 class _Observed(NamedTuple):
     """n observations of m points, sorted by point; each point has at least one.
 
-    A camera observes the homogeneous point `constant` + `along` q of a point q = [x/z, y/z, 1/z] in the nearest camera.
-    The result does not depend on the world origin.
+    A point q = [x/z, y/z, 1/z] in the nearest camera is the homogeneous point `constant` + `along` q in the camera of
+    an observation. Both are from relative poses, so that the world origin does not matter.
     """
 
     row: NDArray[np.int64]
@@ -248,12 +248,12 @@ def _put(
     sums: FloatArray,
     anchor: FloatArray,
 ) -> None:
-    """Write the points q (3, m) of the rows `place` and their information, in the reference frame of the poses."""
+    """Write the positions of points q (3, m) and their information to the rows `place`, in the reference frame."""
     x, y, near = q
     R = anchor[:, :3, :3]
     ray = np.stack([x, y, np.ones_like(x)], axis=1)[:, :, None]
     position[place] = (R @ (ray / near[:, None, None]))[:, :, 0] + anchor[:, :3, 3]
-    by_point = np.zeros((len(x), 3, 3))  # of q by the point in the nearest camera
+    by_point = np.zeros((len(x), 3, 3))  # derivative of q w.r.t. the position in the nearest camera
     by_point[:, 0, 0] = by_point[:, 1, 1] = near
     by_point[:, :, 2] = -near[:, None] * q.T
     by_point = by_point @ R.swapaxes(1, 2)

@@ -19,25 +19,25 @@ POSE_DEGREES = 6
 def anees(runs: Iterable[tuple[Estimate, Truth]]) -> pd.DataFrame:
     """NEES averaged over runs, one row per `frame`: `anees`, number of `runs`, and 95 % bounds `low` and `high`.
 
-    The bounds assume independent runs (other noise, other seeds) and Gaussian errors; each frame stands alone. Runs may
-    differ in length. The mean of `anees` over frames, whose errors are correlated, lies inside the bounds of a single
-    frame with at least about their probability.
+    The bounds assume independent runs (other noise, other seeds) and Gaussian errors. They are those of a single frame.
+    Errors of frames are correlated, and the mean of `anees` over frames scatters at most as much as one frame: it lies
+    inside these bounds with a probability of about 95 % or more. Runs may differ in length.
     """
     return average_nees([nees(estimate, truth) for estimate, truth in runs])
 
 
 def average_nees(columns: Sequence[FloatArray], degrees: int = POSE_DEGREES) -> pd.DataFrame:
-    """NEES (T,), with these `degrees` of freedom, of each run averaged over runs; for the columns see `anees`."""
+    """Average over runs of their NEES (T,), which has `degrees` degrees of freedom; for the columns see `anees`."""
     frames = max((len(values) for values in columns), default=0)
     values = np.full((len(columns), frames), np.nan)
     for row, column in zip(values, columns, strict=True):
         row[: len(column)] = column
     n = (~np.isnan(values)).sum(axis=0)
     total = np.nansum(values, axis=0)
-    some = np.maximum(n, 1)
-    low, high = chi_square_bounds(float(degrees), some)
+    divisor = np.maximum(n, 1)
+    low, high = chi_square_bounds(float(degrees), divisor)
     table = pd.DataFrame(
-        {"anees": total / some, "runs": n, "low": low, "high": high}, index=pd.RangeIndex(frames, name="frame")
+        {"anees": total / divisor, "runs": n, "low": low, "high": high}, index=pd.RangeIndex(frames, name="frame")
     )
     table.loc[n == 0, ["anees", "low", "high"]] = np.nan
     return table
@@ -49,15 +49,14 @@ class AneesSummary(NamedTuple):
     anees: float
     low: float
     high: float
-    """95 % bounds of a single frame's average over the runs: errors of neighboring frames are correlated, so the mean
-    over frames scatters at most as much as one of them"""
+    """95 % bounds of the average over the runs at a single frame; see `anees`"""
     inside: float
     """share of the frames whose average over the runs lies inside its bounds (expected 0.95)"""
     runs: int
 
 
 def anees_summary(columns: Sequence[FloatArray]) -> AneesSummary:
-    """ANEES over all frames from the NEES (T,) of each run; NaN where no run has any."""
+    """ANEES over all frames from the NEES (T,) of each run; NaN without a NEES."""
     known = [values for values in columns if not np.isnan(values).all()]
     table = average_nees(known)
     table = table[table["runs"] == len(known)] if known else table

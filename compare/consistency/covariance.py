@@ -12,11 +12,11 @@ from fgbaseline.data import Estimate
 from fgbaseline.geometry import FloatArray, se3
 
 HELD = 1e-11
-"""m^2 or rad^2: a pose whose largest entry is not above it is held fixed and has no error"""
+"""m^2 or rad^2; a covariance whose largest entry is at most this is that of a pose held fixed"""
 ROUNDING = 1e-13
-"""smallest eigenvalue of a correlation matrix that is not rounding"""
+"""eigenvalue of a correlation matrix up to which it counts as zero"""
 SINCE_FIRST_SHARE = 0.5
-"""share of the poses whose covariance has to grow from that of the first pose to be one of the motion since it"""
+"""smallest share of positive definite P_k - A_k P_0 A_k^T, for covariances to count as grown from the first pose's"""
 
 
 class CovarianceState(IntEnum):
@@ -78,8 +78,8 @@ def covariance_since_first(poses: FloatArray, covariance: FloatArray) -> FloatAr
     """Covariances (n, 6, 6) of the motions since the first of poses (n, 4, 4); None where the covariances are absolute.
 
     P_k - A_k P_0 A_k^T with A_k the adjoint of T_k^-1 T_0: the uncertainty that dead reckoning from an uncertain start
-    adds; zero for the first pose. None where it is positive definite for less than SINCE_FIRST_SHARE of the other
-    poses, as covariances of absolute positions are.
+    adds; zero for the first pose. None where this difference is positive definite for less than SINCE_FIRST_SHARE of
+    the other poses: then the covariances are of absolute positions.
     """
     first = covariance[:1]
     if not np.isfinite(first).all() or not (np.abs(first).max() <= HELD or is_positive_definite(first)[0]):

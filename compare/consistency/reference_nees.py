@@ -14,9 +14,9 @@ from .covariance import CovarianceState, covariance_state, is_positive_definite
 from .nees import body_error
 
 NEGLIGIBLE = 1e-6
-"""share of the filter's own variance, below which the difference has no variance in a direction"""
+"""ratio of the variance of P - P_ref to that of P, in a direction, up to which it counts as zero"""
 SMALLER = 0.1
-"""share of the filter's variance, by which the reference's must exceed it in a direction of an overconfident pose"""
+"""ratio of the variance of P_ref - P to that of P, in some direction, above which a pose is overconfident"""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -28,7 +28,7 @@ class ReferenceNees(Displayed):
     comparable: BoolArray
     """frames (T,) in which both have a pose and a positive definite covariance"""
     overconfident: BoolArray
-    """comparable frames (T,) in which P is smaller than P_ref in some direction, which uses at least the same data"""
+    """comparable frames (T,) in which P is smaller than P_ref in some direction, although P_ref is from no less data"""
 
     @property
     def is_overconfident(self) -> bool:
@@ -51,8 +51,8 @@ def reference_nees(estimate: Estimate, reference: Estimate) -> ReferenceNees:
     errors common to both do not show.
     """
     T = len(estimate.world_T_imu)
-    sound = [covariance_state(e) == CovarianceState.POSITIVE_DEFINITE for e in (estimate, reference)]
-    both = np.asarray(sound[0] & sound[1], dtype=np.bool_)
+    valid = [covariance_state(e) == CovarianceState.POSITIVE_DEFINITE for e in (estimate, reference)]
+    both = np.asarray(valid[0] & valid[1], dtype=np.bool_)
     result = ReferenceNees(np.full(T, np.nan), both, np.zeros(T, dtype=np.bool_))
     k = np.flatnonzero(result.comparable)
     if estimate.covariance is None or reference.covariance is None or len(k) == 0:
@@ -70,14 +70,14 @@ def reference_nees(estimate: Estimate, reference: Estimate) -> ReferenceNees:
 def difference_covariance(P: FloatArray, P_ref: FloatArray) -> FloatArray:
     """Difference P - P_ref (n, d, d) of positive definite covariances; NaN where it is not positive definite.
 
-    Judged by the eigenvalues of L^-1 (P - P_ref) L^-T with P = L L^T: the share of the filter's variance that the
-    reference removes in each direction. A share up to `NEGLIGIBLE` counts as zero.
+    The eigenvalues of L^-1 (P - P_ref) L^-T with P = L L^T decide: each is the share of the filter's variance that
+    the reference removes in a direction. A share up to `NEGLIGIBLE` counts as zero.
     """
     return _difference_and_share(P, P_ref)[0]
 
 
 def _difference_and_share(P: FloatArray, P_ref: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Covariances of the difference, and the smallest shares that decide whether they are positive definite."""
+    """P - P_ref (n, d, d), NaN where not positive definite, and its `smallest_share` (n,)."""
     P, P_ref = 0.5 * (P + np.swapaxes(P, 1, 2)), 0.5 * (P_ref + np.swapaxes(P_ref, 1, 2))
     difference, share = P - P_ref, smallest_share(P, P_ref)
     difference[~((share > NEGLIGIBLE) & is_positive_definite(difference))] = np.nan

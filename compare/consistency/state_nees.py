@@ -1,14 +1,17 @@
 """Errors and consistency of the states that raw inertial data determine: pose, velocity and biases.
 
-Errors are those of `geometry.strapdown`: [translation, rotation, velocity, gyroscope bias, accelerometer bias]. That of
-a pose X is e = log(X^-1 X_true) in the estimated body frame. The others are the true less the estimated value, with
-velocities in world axes. The NEES has the velocity of the extended pose instead (Brossard et al., IEEE T-RO 2022):
-R J(theta)^-1 R^T (v_true - v), with J the left Jacobian of the rotation error theta. Both are equal to first order, so
-that the covariance is the same. Position and velocity then rotate alike with theta. Samples relate them to 0.02 mm a
-frame, which theta times the velocity error exceeds: 1 mm at 2 degrees and 0.3 m/s.
+Errors are those of `geometry.strapdown`: [translation, rotation, velocity, gyroscope bias, accelerometer bias]. The
+error of a pose X is e = log(X^-1 X_true) in the estimated body frame. The other errors are true minus estimated value,
+with velocities in world axes.
 
-No alignment precedes the NEES: position and heading of frame 0 define the world of both. Where the truth begins later,
-both are tied over its first frames: position and heading then have too low a NEES.
+The NEES uses the velocity error of the extended pose instead (Brossard et al., IEEE T-RO 2022):
+R J(theta)^-1 R^T (v_true - v), with J the left Jacobian of the rotation error theta. Both errors are equal to first
+order, so the covariance is the same. The second-order difference matters: P relates position and velocity to 0.02 mm
+per frame by the samples, and theta times the velocity error would be 1 mm at 2 degrees and 0.3 m/s. In the extended
+pose, the errors of position and velocity rotate alike with theta.
+
+No alignment precedes the NEES: position and heading of frame 0 define the world of truth and estimate. Where the truth
+begins later, the worlds are aligned over its first frames, and the NEES of position and heading is too low.
 """
 
 import numpy as np
@@ -30,7 +33,7 @@ AXES = "xyz"
 
 
 def state_error(estimate: Estimate, other: Truth | Estimate) -> FloatArray:
-    """Error (T, 15) of the state against truth or another estimate; NaN where either lacks a value."""
+    """Error (T, 15) of the state, `other` minus `estimate`, see the module; NaN where either lacks a value."""
     T = len(estimate.world_T_imu)
     error = np.full((T, strapdown.STATE), np.nan)
     error[:, :6] = body_error(estimate, other)
@@ -42,7 +45,7 @@ def state_error(estimate: Estimate, other: Truth | Estimate) -> FloatArray:
 
 
 def _extended_pose_error(estimate: Estimate, other: Truth | Estimate) -> FloatArray:
-    """Error (T, 15) as in `state_error`, with the velocity error of the extended pose, in world axes."""
+    """`state_error` (T, 15) with the velocity error of the extended pose, in world axes."""
     error = state_error(estimate, other)
     k = np.flatnonzero(np.isfinite(error[:, :9]).all(axis=1))
     X, X_other = _with_velocity(estimate, k), _with_velocity(other, k)

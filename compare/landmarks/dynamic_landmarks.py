@@ -21,8 +21,10 @@ EXPLAINED = 0.5
 """share of the squared residuals that the velocity must explain"""
 ITERATIONS = 8
 """iterations of Gauss-Newton; a step that increases a track's cost is rejected and shortened"""
-CONVERGED, CONVERGED_STATIC = 1e-16, 1e-6
-"""predicted decrease of a track's cost at convergence, as a share; the latter for tracks of a static point"""
+CONVERGED = 1e-16
+"""predicted decrease of a track's cost at convergence, relative to 1 + cost"""
+CONVERGED_STATIC = 1e-6
+"""as `CONVERGED`, for the velocity of tracks that a static point fits"""
 UNOBSERVABLE = 1e-9
 """share of the largest eigenvalue of a track's scaled normal equations, below which a direction is unobservable"""
 SYMMETRIC, PULL = [0, 1, 2, 4, 5, 7], [3, 6, 8]
@@ -67,12 +69,12 @@ class _Observations(NamedTuple):
 
 
 def dynamic_landmarks(problem: Problem, estimate: Estimate, table: pd.DataFrame) -> pd.DataFrame:
-    """Test of each landmark with at least MIN_OBSERVATIONS `evaluated_rows` in front of the camera, one row each:
+    """Test of each landmark with at least MIN_OBSERVATIONS `evaluated_rows` in front of the camera, one row each.
 
-    `landmark`, `n`, `squared` (whitened squared residuals of the best static point), `gain`, their decrease for a point
-    of constant velocity, `speed` in m/s, and `moved`: the gain is significant by chi-square with 3 degrees of freedom
-    over all tracks, and explains half of the residuals. A sliding track and an error of the path look the same; a
-    landmark that is dynamic along every path is dynamic.
+    Columns: `landmark`; `n` observations; `squared`, the whitened squared residuals of the best static point; `gain`,
+    their decrease for a point of constant velocity; `speed`, m/s; and `moved`, whether the gain is significant
+    (chi-square with 3 degrees of freedom, Bonferroni over all tracks) and more than half of the residuals. A sliding
+    track and an error of the poses have the same effect; only a landmark that moves for every estimate is dynamic.
     """
     rows = evaluated_rows(problem, table)
     rows = rows[(rows["depth"] > 0) & np.isfinite(rows["error"])]
@@ -82,9 +84,8 @@ def dynamic_landmarks(problem: Problem, estimate: Estimate, table: pd.DataFrame)
     observations = _observations_of(problem, estimate, rows, row)
     start = estimate.landmarks.position[np.searchsorted(estimate.landmarks.index, landmark)]
     standing, squared = _fitted(observations, start, np.full(n, CONVERGED))
-    converged = np.where(
-        _significant(squared), CONVERGED, CONVERGED_STATIC
-    )  # an insignificant cost cannot fall significantly
+    # The gain is at most the cost, so it is not significant where the cost is not.
+    converged = np.where(_significant(squared), CONVERGED, CONVERGED_STATIC)
     moving, left = _fitted(observations, np.concatenate([standing, np.zeros((n, 3))], axis=1), converged)
     gain = squared - left
     return pd.DataFrame(
@@ -100,7 +101,7 @@ def dynamic_landmarks(problem: Problem, estimate: Estimate, table: pd.DataFrame)
 
 
 def _significant(gain: FloatArray) -> BoolArray:
-    """Whether (m,) the gain of a velocity is significant over all m tracks."""
+    """Whether (m,) a gain (m,) is significant at `SIGNIFICANCE` over all m tracks."""
     return np.asarray(p_value(gain, 3.0) < SIGNIFICANCE / max(len(gain), 1))
 
 

@@ -13,17 +13,17 @@ from ..residuals.residual_classes import DEPTHS, depth_classes
 from ..statistics.chi_square import mahalanobis_squared
 
 MIN_WITH_SIGMAS = 10
-"""landmarks of a depth class that has a median in sigmas: few have a positive definite P - P_ref"""
+"""smallest number of landmarks with `sigmas` for a median: few have a positive definite P - P_ref"""
 
 
 def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) -> pd.DataFrame:
-    """Difference of each landmark that both maps have and a frame with both poses observes, one row per `landmark`:
+    """Difference of the landmarks that both maps have and a frame with both poses observes, one row per `landmark`.
 
-    `distance` in the world, m, drift of the paths included; `seen`, the distance of the two points in their own camera
-    frames at the observation nearest to the reference's camera, m, free of drift; `depth` of the reference's point
-    there, m; `sigmas`, the Mahalanobis norm sqrt(d^T (P - P_ref)^-1 d) of the world difference, as the two share their
-    data. `sigmas` is NaN without covariances, and `left_out` where P - P_ref is not positive definite. For a consistent
-    pair the square of `sigmas` is chi-square with 3 degrees of freedom.
+    Columns: `distance` in the world, m, which includes drift of the trajectories; `seen`, the distance between the
+    points in the camera frames of their own trajectories, m, without drift, at the observation nearest to the
+    landmark; `depth` of the reference's point there, m; `sigmas`, the Mahalanobis norm sqrt(d^T (P - P_ref)^-1 d) of
+    the world difference d, as both use the same data, NaN without covariances; `left_out`, whether P - P_ref is not
+    positive definite. For a consistent pair the square of `sigmas` is chi-square with 3 degrees of freedom.
     """
     index, mine, its = np.intersect1d(estimate.landmarks.index, reference.landmarks.index, return_indices=True)
     frame = _nearest_observation(sequence, estimate, reference)[index]
@@ -38,12 +38,12 @@ def map_difference(sequence: Sequence, estimate: Estimate, reference: Estimate) 
     sigmas, left_out = np.full(len(index), np.nan), np.zeros(len(index), dtype=np.bool_)
     if estimate.landmarks.covariance is not None and reference.landmarks.covariance is not None:
         P, Q = estimate.landmarks.covariance[mine], reference.landmarks.covariance[its]
-        sound = np.flatnonzero(np.isfinite(P).all(axis=(1, 2)) & np.isfinite(Q).all(axis=(1, 2)))
-        sound = sound[is_positive_definite(P[sound]) & is_positive_definite(Q[sound])]
-        D = difference_covariance(P[sound], Q[sound])
+        valid = np.flatnonzero(np.isfinite(P).all(axis=(1, 2)) & np.isfinite(Q).all(axis=(1, 2)))
+        valid = valid[is_positive_definite(P[valid]) & is_positive_definite(Q[valid])]
+        D = difference_covariance(P[valid], Q[valid])
         positive = np.isfinite(D).all(axis=(1, 2))
-        left_out[sound[~positive]] = True
-        sigmas[sound[positive]] = np.sqrt(mahalanobis_squared((p - q)[sound[positive]], D[positive]))
+        left_out[valid[~positive]] = True
+        sigmas[valid[positive]] = np.sqrt(mahalanobis_squared((p - q)[valid[positive]], D[positive]))
     return pd.DataFrame(
         {
             "landmark": index,
@@ -75,9 +75,9 @@ def map_by_depth(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _nearest_observation(sequence: Sequence, estimate: Estimate, reference: Estimate) -> IntArray:
-    """Frame (N,) that observes each landmark from nearest on the reference's path; -1 where none does.
+    """Frame (N,) with the observation of each landmark nearest to it on the reference's path, or -1.
 
-    Over frames in which both have a pose; landmarks that the reference lacks have none.
+    Only frames in which both have a pose count. Landmarks that the reference lacks have -1.
     """
     o = sequence.observations
     position = np.full((sequence.n_landmarks, 3), np.nan)

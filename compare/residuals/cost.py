@@ -12,11 +12,11 @@ from .reprojection import reprojection
 
 
 def cost(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
-    """Half the sum of squared whitened residuals over the observations `taken` (n,) of the sequence's.
+    """Half the sum of squared whitened residuals: pixels, motion and landmark priors.
 
-    Pixels under the problem's kernel, plus motion increments and landmark priors; NaN where the estimate lacks a pose
-    or a landmark of `taken`. The prior of the first pose is left out, since that pose is held; with raw inertial data
-    the start counts in the directions in which it has variance.
+    `taken` (n,) is the mask of the sequence's observations that count; their pixels have the loss of the problem's
+    kernel. NaN where the estimate lacks a pose or a landmark of `taken`. The first pose is fixed and has no prior term;
+    with raw inertial data the prior of the start counts in the directions in which it has variance.
     """
     table = reprojection(problem.sequence, estimate)
     table = table[taken[table["observation"].to_numpy()]]
@@ -54,7 +54,7 @@ def motion_residuals(problem: Problem, estimate: Estimate) -> FloatArray:
 
 
 def prior_squares(problem: Problem, estimate: Estimate, taken: BoolArray) -> float:
-    """Sum of squared whitened prior residuals of the landmarks in the observations `taken` (n,)."""
+    """Sum of squared whitened prior residuals of the landmarks that the mask `taken` (n,) of observations has."""
     prior = problem.landmark_prior
     if prior is None:
         return 0.0

@@ -4,8 +4,8 @@ Each piece of a held-out track is triangulated along a path from one half of its
 half, and vice versa. The error measures the path between the two halves: a track of 13 frames covers about one second
 of motion, and drift over longer times does not show.
 
-All paths share one mask. A piece is an inlier where its smallest error over the paths is below `GATE` times the median
-of these (3 to 12 px). An outlier is explained by no path, so its exclusion favors none.
+All paths share one mask. A piece is an inlier if its smallest RMSE over the paths is below a gate: `GATE` times the
+median of these smallest errors, within 3 to 12 px. No path explains an outlier, so its exclusion favors none.
 """
 
 from collections.abc import Hashable, Mapping
@@ -24,7 +24,7 @@ from fgbaseline.geometry.triangulation import triangulate_tracks
 from .reprojection import NEAR
 
 GATE = 6.0
-"""factor on the median of the smallest errors"""
+"""gate as a multiple of the median over the pieces of the smallest RMSE over the paths"""
 GATE_RANGE = (3.0, 12.0)
 """px; bounds of the gate"""
 BLOCK = 5.0
@@ -38,7 +38,7 @@ class HeldOutErrors(Displayed):
     """Prediction errors of several paths on the same held-out observations."""
 
     table: pd.DataFrame
-    """one row per inlier observation: `piece`, `landmark`, `frame`, `start` (s, of its piece)"""
+    """one row per inlier observation: `piece`, `landmark`, `frame` and `start`, s, the first stamp of the piece"""
     error: pd.DataFrame
     """a column per path, px: norm of the four pixel residuals; infinite behind the camera"""
     gate: float
@@ -54,11 +54,11 @@ def held_out_errors(
 ) -> HeldOutErrors:
     """Prediction errors of paths (T, 4, 4) on the held-out pieces within the frames that all of them have.
 
-    `sequence` holds stamps, camera and extrinsic as the estimators use them; `pixel_variance`, px^2, scales the kernel
-    of the triangulation. Raises FgbaselineError without a path.
+    `sequence` holds stamps, camera and extrinsic as the estimators use them; `pixel_variance`, px^2, is that of the
+    triangulation, which has the Huber kernel. Raises FgbaselineError without a path.
     """
     if not paths:
-        raise FgbaselineError("held-out tracks need at least one trajectory to be judged")
+        raise FgbaselineError("held-out tracks: there is no trajectory to evaluate")
     everywhere = np.isfinite(np.stack(list(paths.values()))).all(axis=(0, 2, 3))
     chosen = _by_piece(held, np.asarray(everywhere, dtype=np.bool_))
     error = np.stack(

@@ -14,8 +14,9 @@ WALKS = (strapdown.GYROSCOPE_BIAS, strapdown.ACCELEROMETER_BIAS)
 def inertial_residuals(imu: ImuIntervals, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
     """Residuals (T-1, 15) of the samples between frames, and their covariances (T-1, 15, 15).
 
-    The state of frame k + 1 less the one predicted from frame k with the biases of frame k, as an error of the
-    prediction: see `geometry.strapdown`. NaN where the estimate lacks a pose, velocity or bias.
+    A residual is the state of frame k + 1 relative to its prediction from frame k, with the biases of frame k, in the
+    order and units of `geometry.strapdown` and with velocities in world axes. NaN where the estimate lacks a pose,
+    velocity or bias.
     """
     n = len(estimate.world_T_imu) - 1
     residual = np.full((n, strapdown.STATE), np.nan)
@@ -44,7 +45,7 @@ def inertial_squares(imu: ImuIntervals, estimate: Estimate) -> FloatArray:
 
 
 def start_square(problem: Problem, start: InertialStart, estimate: Estimate) -> float:
-    """Squared whitened norm of the state of frame 0 less the start, over the directions in which it has variance."""
+    """Squared whitened norm of the state of frame 0 minus the start, in the directions with variance."""
     v, bg, ba = estimate.velocity, estimate.gyroscope_bias, estimate.accelerometer_bias
     if v is None or bg is None or ba is None:
         return float("nan")

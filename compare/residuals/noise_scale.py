@@ -16,14 +16,15 @@ RANGE = (1e-9, 1e9)
 
 
 def pixel_scale(problem: Problem, estimate: Estimate) -> float:
-    """Scale s of Gaussian pixel noise, in units of the model's sigma, that explains the residuals an estimate used.
+    """Scale s of Gaussian pixel noise, in sigmas of the model, estimated from the residuals of used observations.
 
-    At s the expected sum of kernel-weighted whitened squares equals the observed one. The residual of an observation
-    is Gaussian over its r rows with the variance s^2 (1 - h), h being the leverage of the estimated parameters: of the
-    landmark 3 / (r n) in a track of n observations (zero where it has a prior), of the poses what motion and priors
-    retain of their squares. In a linear least-squares problem the expected squares of pixels, motion and priors add up
-    to r n - 3 m for m landmarks without a prior (r n with one): what motion and priors retain is
-    missing from the pixels. NaN for a NaN residual or no degree of freedom, infinite for an infinite residual.
+    At s the expected sum of kernel-weighted whitened squares equals the observed sum. A whitened residual is taken as
+    Gaussian over its r rows with the variance s^2 (1 - h), where the leverage h of the estimated parameters has two
+    parts. That of a landmark is 3 / (r n) in a track of n observations (zero with a prior). That of the poses follows
+    from the squares of motion and priors: in linear least squares, the expected squares of pixels, motion and priors
+    add up to r n - 3 m for n observations of m landmarks without a prior (r n with one), so the observed squares of
+    motion and priors reduce those of the pixels. NaN for a NaN residual or without degrees of freedom, infinite for an
+    infinite residual.
     """
     table = reprojection(problem.sequence, estimate)
     table = table[table["used"]]

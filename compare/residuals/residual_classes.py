@@ -22,11 +22,11 @@ REGION_ROWS, REGION_COLUMNS = ("top", "middle", "bottom"), ("left", "center", "r
 def residual_patterns(sequence: Sequence, table: pd.DataFrame) -> pd.DataFrame:
     """Residuals of a reprojection table by classes, one row per non-empty class.
 
-    Columns: `by` (distance, track age, region, side); `of`, the class; `n`; `median`, `mean` and `p95` of the error,
-    px; and the bias of the class, the median residuals `u` and `v` over both cameras, px. `distance` is the depth
-    in front of the left camera (no class behind it), `track age` counts the observations of the track so far, `region`
-    is the ninth of the left image within the bounding box of the observations, and `side` compares the error of the
-    left camera, the norm of uL and vL, with that of the right one.
+    Columns: `by`, the kind of class; `of`, the class; `n`; `median`, `mean` and `p95` of the error, px; and the bias of
+    the class, the median residuals `u` and `v` over both cameras, px. Kinds: `distance`, the depth in front of the left
+    camera (no class behind it); `track age`, the number of observations of the track so far; `image region`, the ninth
+    of the bounding box of the observations in the left image; `camera`, where the error of the left camera is the norm
+    of uL and vL, and that of the right one of uR and vR.
     """
     u, v = table["uL"], table["vL"]
     if not sequence.monocular:

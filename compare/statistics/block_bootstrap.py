@@ -24,13 +24,15 @@ REPETITIONS = 1000
 MIN_BLOCKS = 10
 """blocks in a series below which an interval is not reliable"""
 MAX_BLOCKS = 5000
-"""blocks in a series at most; longer blocks than the correlation requires do no harm at this number"""
+"""largest number of blocks in a series; with so many, blocks may be longer than the correlation requires"""
 
 OF_SERIES = ("rmse", "mean", "median", "std", "p95")
+"""statistics with an interval"""
 QUANTILES = {"median": 0.5, "p95": 0.95}
 WITHOUT_INTERVAL = ("min", "max", "sse")
-"""the bootstrap is not consistent for extremes, and a sum grows with the number of errors"""
+"""statistics without an interval: the bootstrap is not consistent for extremes, and a sum grows with n"""
 INSIGNIFICANT_IN_A_ROW = 5
+"""smallest number of consecutive insignificant lags at which the autocorrelation has ended"""
 
 
 class BlockLength(NamedTuple):
@@ -103,11 +105,11 @@ class ErrorStatistics(Displayed):
     block: int
     """block length, in errors"""
     blocks: float
-    """the number of blocks that fits into the series"""
+    """number of blocks that fit into the series"""
     confidence: float
     reliable: bool
-    """whether there are MIN_BLOCKS of them and the correlation ends within the series, which that of an error that
-    grows with the path does not"""
+    """whether at least MIN_BLOCKS blocks fit and the correlation ends within the series; False for an error that grows
+    with the path"""
     missing: int
     """number of NaN"""
 
@@ -154,7 +156,8 @@ def bootstrapped(
 
     Intervals are percentiles over `repetitions` series of random blocks of the errors, which preserves their
     correlation in time. `block` is by default the longer of Politis and White's for the errors and their squares,
-    and no less than n / MAX_BLOCKS. Infinite errors count, and leave no interval. All NaN where there is no error.
+    and no less than n / MAX_BLOCKS. Infinite errors count in the statistics, which then have no interval. All NaN
+    without an error.
     Raises InputError for a confidence outside (0, 1), fewer than 1 repetition, or a block that is not between 1 and n.
     """
     if not 0.0 < confidence < 1.0 or repetitions < 1:

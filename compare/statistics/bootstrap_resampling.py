@@ -1,4 +1,4 @@
-"""Draws of a moving-block bootstrap: sums and quantiles of the drawn series, which are never written out."""
+"""Draws of a moving-block bootstrap: sums and quantiles of the drawn series, which are not stored."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ FEW = 8
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BlockDraws:
-    """Draws of r series of n values each: blocks of a series that begin anywhere; the last one is truncated."""
+    """Draws of r series of n values each, of blocks with random starts; the last block is truncated."""
 
     start: IntArray
     """start of each block (r, m)"""
@@ -42,7 +42,7 @@ class BlockDraws:
         return self._sums(values) / self.n
 
     def counts(self, chosen: BoolArray, draws: IntArray | None = None) -> IntArray:
-        """Number (r,) of values, `chosen` (n,) True, in each drawn series, or (k,) in some of the `draws`."""
+        """Number (r,) of values of the mask `chosen` (n,) in each drawn series, or (k,) in the series `draws` (k,)."""
         return self._sums(chosen.astype(np.int32), draws).astype(np.int64)
 
     def quantiles(self, values: FloatArray, at: tuple[float, ...]) -> FloatArray:
@@ -80,12 +80,13 @@ class BlockDraws:
     def _near(
         self, values: FloatArray, rising: FloatArray, first: int, counts: IntArray, rank: int
     ) -> tuple[IntArray, int]:
-        """Draws among which are those of this `rank` (0 to r - 1) and the next by their quantiles; how many lie below.
+        """Draws that include those of `rank` and `rank` + 1 (0 to r - 1) by their quantiles, and the number below them.
 
-        A quantile lies between the values of ranks `first` and `first` + 1 of its series. Draws are left out below a
-        threshold that at most `rank` quantiles can reach, and above one that `rank` + 2 surely do. The first threshold
-        is `rising[first]`, with the `counts` (r,); the next two are around Bahadur's (1966) linear guess from it; then
-        they bisect.
+        The quantile of a series lies between its values of ranks `first` and `first` + 1. The number of values below a
+        threshold shows in which series the quantile may be below it, and in which it surely is. If at most `rank` may
+        be below, the sure ones are excluded from below; if `rank` + 2 surely are, the others are excluded from above.
+        The first threshold is `rising[first]`, with the `counts` (r,); the next two are around Bahadur's (1966) linear
+        guess; then the thresholds bisect.
         """
         guess, margin = int(np.sort(2 * first - counts)[rank]), 1 + int(counts.std() / 20.0)
         trials = [guess - margin, guess + margin]

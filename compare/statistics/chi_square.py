@@ -1,4 +1,4 @@
-"""Normalized squared errors; chi-square quantiles, bounds and p-values of them and their averages."""
+"""Normalized squared errors, and chi-square quantiles, bounds and p-values of these and their averages."""
 
 import numpy as np
 from scipy.special import chdtrc, gammaincinv
@@ -18,14 +18,14 @@ def mahalanobis_squared(error: FloatArray, P: FloatArray) -> FloatArray:
 
 
 def chi_square_quantile(probability: float, degrees: FloatArray | float) -> FloatArray:
-    """Quantile of chi-square with `degrees` degrees of freedom at this probability."""
+    """Quantiles (...) of chi-square with `degrees` (...) degrees of freedom at this probability."""
     return np.asarray(2.0 * gammaincinv(np.asarray(degrees, dtype=np.float64) / 2.0, probability), dtype=np.float64)
 
 
 def chi_square_bounds(
     degrees: FloatArray | float, n: FloatArray | float = 1, probability: float = PROBABILITY
 ) -> tuple[FloatArray, FloatArray]:
-    """Two-sided bounds of the mean of n *independent* chi-square values with `degrees` degrees of freedom each.
+    """Two-sided bounds (...) of the mean of n (...) *independent* chi-square values with `degrees` (...) each.
 
     Their sum is chi-square with n times the degrees. The mean of correlated values (errors of neighboring frames)
     scatters more, at most as much as a single value: n = 1.
@@ -35,7 +35,7 @@ def chi_square_bounds(
 
 
 def p_value(value: FloatArray, degrees: FloatArray | float) -> FloatArray:
-    """Probability that chi-square is at least `value` (p-value); uniform in [0, 1] where the model holds."""
+    """Probability (n,) that chi-square is at least `value` (n,) (p-value); uniform in [0, 1] where the model holds."""
     return np.asarray(chdtrc(np.asarray(degrees, dtype=np.float64), value), dtype=np.float64)
 
 

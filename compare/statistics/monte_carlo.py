@@ -26,9 +26,9 @@ class MeanInterval(NamedTuple):
 
 
 def mean_interval(values: FloatArray) -> MeanInterval:
-    """Mean of values (n,) over runs with the interval x +- t s / sqrt(n), t with n - 1 degrees of freedom; without NaN.
+    """Mean of values (n,) over runs with the interval x +- t s / sqrt(n), t with n - 1 degrees of freedom.
 
-    An infinite value makes the mean infinite, without an interval.
+    NaN values are left out. An infinite value makes the mean infinite, without an interval.
     """
     known = values[~np.isnan(values)]
     n = len(known)

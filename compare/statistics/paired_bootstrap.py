@@ -43,13 +43,15 @@ def rmse_difference(
     """RMSE of `errors` (n,) minus that of `others` (n,), with the interval of a paired moving-block bootstrap.
 
     Both are of the same stamps, in order; stamps where either is NaN are left out. Infinite errors make the
-    difference infinite, or NaN and unsettled where both have some. Each repetition draws the same blocks for both,
+    difference infinite, or NaN if both have such errors. Each repetition draws the same blocks for both,
     which cancels variation that they share: the order can be settled although the intervals of the two RMSEs overlap.
-    The block length is Politis and White's for the differences of squared errors. InputError for unequal lengths.
+    The block length is Politis and White's for the differences of squared errors.
+
+    Raises InputError for unequal lengths.
     """
     pair = [np.asarray(e, dtype=np.float64) for e in (errors, others)]
     if pair[0].shape != pair[1].shape or pair[0].ndim != 1:
-        raise InputError(f"errors at the same stamps are needed, got {pair[0].shape} and {pair[1].shape} of them")
+        raise InputError(f"expected errors (n,) at the same n stamps, got shapes {pair[0].shape} and {pair[1].shape}")
     squares: FloatArray = np.stack(pair, axis=1) ** 2
     squares = squares[~np.isnan(squares).any(axis=1)]
     n = len(squares)
@@ -88,7 +90,9 @@ def paired_ranking(errors: Mapping[str, ArrayLike], *, seed: int = 0) -> PairedR
     """
     columns = {name: np.asarray(e, dtype=np.float64) for name, e in errors.items()}
     if len({column.shape for column in columns.values()}) > 1:
-        raise InputError("errors at the same stamps are needed, got some of different lengths")
+        raise InputError(
+            f"expected errors (n,) at the same n stamps, got shapes {sorted({each.shape for each in columns.values()})}"
+        )
     everywhere = ~np.any([np.isnan(column) for column in columns.values()], axis=0)
     common = {name: column[everywhere] for name, column in columns.items()} if columns else {}
     if not any(len(column) for column in common.values()):

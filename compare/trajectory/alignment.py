@@ -34,9 +34,9 @@ _CAPTIONS = {
     Align.SE3: "SE(3)-aligned",
     Align.SIM3: "Sim(3)-aligned",
 }
-ROTATION = "the rotation"
-SCALE = "the scale"
-YAW = "the yaw"
+EVERY_ROTATION = "every rotation"
+SCALE = "scale"
+YAW = "yaw"
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -49,6 +49,7 @@ class Alignment(Displayed):
     translation: FloatArray = field(default_factory=lambda: np.zeros(3))
     """(3,) m"""
     scale: float = 1.0
+    """ratio of reference to estimate; 1 unless `kind` is SIM3"""
     n: int = 0
     """number of pose pairs used"""
     available: int = 0
@@ -89,7 +90,7 @@ class Alignment(Displayed):
         if self.kind is Align.SIM3:
             text += f" (scale {self.scale:.6g})"
         if self.free:
-            text += f"; positions do not determine {' and '.join(self.free)}"
+            text += f"; not determined by the positions: {' and '.join(self.free)}"
         return text
 
 
@@ -179,7 +180,7 @@ def _free_rotation(axis: FloatArray | None) -> tuple[str, ...]:
     if axis is None:
         return ()
     if not axis.any():
-        return (ROTATION,)
+        return (EVERY_ROTATION,)
     return (f"the rotation about ({axis[0]:.3f}, {axis[1]:.3f}, {axis[2]:.3f})",)
 
 

@@ -15,7 +15,7 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 from .alignment import Align, Alignment, align
 
 TOLERANCE = 0.01
-"""s; at 15 m/s a car has moved by 15 cm"""
+"""s, largest difference of paired stamps: a car at 15 m/s moves by 15 cm"""
 
 
 class Association(StrEnum):

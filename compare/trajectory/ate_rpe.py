@@ -47,7 +47,9 @@ def absolute_pose_error(estimate: FloatArray, reference: FloatArray, what: PoseR
     """
     what = PoseRelation(what)
     if what in (PoseRelation.DISTANCE, PoseRelation.DISTANCE_PERCENT):
-        raise InputError(f"{what}: a measure of motions; a pose has {', '.join(POSE_COLUMNS)} or rotation")
+        raise InputError(
+            f"{what}: defined for motions (RPE) only; for poses choose {', '.join(POSE_COLUMNS)} or rotation"
+        )
     apart = estimate[:, :3, 3] - reference[:, :3, 3]
     return _measured(apart, estimate[:, :3, :3], reference[:, :3, :3], what)
 
@@ -67,10 +69,10 @@ def relative_pose_error(
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(reference_length > 0, 100.0 * apart / reference_length, np.nan)
     R, R_ref = (np.swapaxes(poses[i, :3, :3], 1, 2) for poses in (estimate, reference))
-    seen, seen_ref = ((turn @ step[:, :, None])[:, :, 0] for turn, step in zip((R, R_ref), steps, strict=True))
+    in_start, in_start_ref = ((turn @ step[:, :, None])[:, :, 0] for turn, step in zip((R, R_ref), steps, strict=True))
     if what is PoseRelation.TRANSLATION:
-        return np.asarray(np.linalg.norm(seen - seen_ref, axis=1))
-    return _measured(seen - seen_ref, R @ estimate[j, :3, :3], R_ref @ reference[j, :3, :3], what)
+        return np.asarray(np.linalg.norm(in_start - in_start_ref, axis=1))
+    return _measured(in_start - in_start_ref, R @ estimate[j, :3, :3], R_ref @ reference[j, :3, :3], what)
 
 
 def _measured(apart: FloatArray, R: FloatArray, R_ref: FloatArray, what: PoseRelation) -> FloatArray:

@@ -39,9 +39,9 @@ def interval_coverage(start: FloatArray, end: FloatArray, whole: FloatArray) -> 
 
 
 def is_insufficient(sample: Mapping[str, float], smallest: int, coverage: float) -> bool:
-    """Whether a sample is too small: `n` below `smallest`, or a `coverage` below the required one.
+    """Whether a sample is too small: `n` below `smallest`, `coverage` too low or fewer than MIN_STRETCHES `stretches`.
 
-    So is one with fewer than MIN_STRETCHES `stretches`. A sample without `coverage` or `stretches` is not judged by it.
+    `coverage` and `stretches` are tested only if the sample has them.
     """
     few = sample.get("stretches", MIN_STRETCHES) < min(MIN_STRETCHES, smallest)
     return few or sample["n"] < smallest or sample.get("coverage", 1.0) < coverage

@@ -10,7 +10,7 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 from .path_length import distance_traveled
 
 ROUNDING = 1e-9
-"""share of a delta: slack for steps that add up to it exactly but for rounding"""
+"""tolerance as a share of a delta, for steps whose sum equals the delta up to rounding"""
 TOLERANCE = 0.1
 """largest deviation from a delta for all pairs, as a share"""
 AT_ONCE = 4_000_000
@@ -56,7 +56,7 @@ def pose_pairs(
         pairs = nearest_delta_pairs(along, delta, miss) if all_pairs else chained_pairs(along, delta)
     if len(pairs) == 0:
         raise InputError(
-            f"delta: no two of the {len(poses)} poses are {delta:g} {unit.value} apart; give a smaller one"
+            f"delta: no two of the {len(poses)} poses are {delta:g} {unit.value} apart; give a smaller delta"
         )
     return pairs
 

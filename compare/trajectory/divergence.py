@@ -30,10 +30,10 @@ def divergence(estimate: Estimate, reference: Estimate, up: ArrayLike = (0.0, 0.
 def truth_errors(
     estimate: Estimate, truth: Truth, up: ArrayLike = (0.0, 0.0, 1.0), *, aligned: bool | Align = False
 ) -> "pd.DataFrame":
-    """Error of each pose against ground truth, without alignment, after SE(3) alignment (`True`) or another one.
+    """Error of each pose against ground truth.
 
-    The alignment is over all frames that both have. NaN in frames without truth and in frames that the estimator did
-    not reach. For the columns see `pose_errors`.
+    `aligned` is False for no alignment, True for SE(3), or another kind; the alignment is over all frames that both
+    have. NaN in frames without truth and in frames that the estimator did not reach. For the columns see `pose_errors`.
     """
     poses = estimate.world_T_imu
     if aligned is True:
@@ -46,7 +46,7 @@ def truth_errors(
 
 
 def truth_alignment(estimate: Estimate, truth: Truth, kind: Align, up: ArrayLike = (0.0, 0.0, 1.0)) -> Alignment:
-    """Transformation of this kind that aligns an estimate to the truth over the frames that both have; none without."""
+    """Alignment of an estimate to the truth over the frames that both have; `Align.NONE` without such a frame."""
     both = truth.known & np.isfinite(estimate.world_T_imu).all(axis=(1, 2))
     if not both.any():
         return Alignment()
@@ -63,7 +63,8 @@ def pose_error_columns(poses: FloatArray, reference: FloatArray, up: ArrayLike) 
 
     Columns: `position`, |p - p_ref|, m; its components `along` and `across` the reference's horizontal direction of
     travel (left positive) and `up`, m; `rotation_deg`, the angle of R_ref^T R; `heading_deg`, the part about `up` (left
-    positive); `traveled`, the length of the reference's path so far, m. NaN where either pose is.
+    positive); `traveled`, the length of the reference's path so far, m. NaN where either pose is. Raises
+    FgbaselineError for different numbers of poses.
     """
     if poses.shape != reference.shape:
         raise FgbaselineError(f"trajectories of {len(poses)} and {len(reference)} poses cannot be compared by frame")
@@ -96,6 +97,7 @@ def divergence_summary(table: "pd.DataFrame") -> dict[str, float]:
 
 
 PARTS = 10
+"""pieces of equal length for the growth of the error"""
 
 
 def divergence_along_path(matched: MatchedTrajectories, up: ArrayLike = (0.0, 0.0, 1.0)) -> "pd.DataFrame":
@@ -123,7 +125,7 @@ def divergence_growth(table: "pd.DataFrame", parts: int = PARTS) -> "pd.DataFram
     """
     traveled = table["traveled"].to_numpy()
     if parts < 1 or not traveled[-1] > 0:
-        raise InputError("growth: a trajectory at rest cannot be split by length, nor one into fewer than 1 part")
+        raise InputError("growth: expected a reference that moves and at least 1 part")
     edges = np.linspace(0.0, traveled[-1], parts + 1)
     first = np.searchsorted(traveled, edges[:-1], side="left")
     last = np.append(first[1:], len(traveled) - 1)
@@ -157,10 +159,11 @@ class Exceedance:
     traveled: float
     """m"""
     value: float
+    """error, in the unit of the column"""
 
 
 def first_exceedance(table: "pd.DataFrame | Columns", bound: float, column: str = "position") -> Exceedance | None:
-    """First row of a `divergence_along_path` table, or of its columns, where |column| is above a bound."""
+    """First row of a `divergence_along_path` table, or of its columns, where |column| exceeds a bound; None without."""
     values, t, traveled = (np.asarray(table[name]) for name in (column, "t", "traveled"))
     beyond = np.flatnonzero(np.abs(values) > bound)
     if len(beyond) == 0:

@@ -15,16 +15,16 @@ LEAST_ROTATION = 5.0
 """deg; smaller rotations between bodies are ignored"""
 ITERATIONS = 20
 LENGTH_UNITS = {1e3: "mm", 1e2: "cm"}
-"""units that positions in place of m may have: their number in a meter"""
+"""number per meter -> unit of length that positions may be in by mistake"""
 SAME_SCALE = 0.05
-"""relative: by so much a scale may differ from that of a unit, from drift"""
+"""largest relative difference between a scale and that of a unit, which drift may cause"""
 MIN_PAIRS = 10
-"""pairs of poses, below which no convention is detected"""
+"""smallest number of pose pairs for the detection of a convention"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BodyRotation:
-    """The constant rotation from the reference's body to the estimate's."""
+    """Constant rotation between the body frames of reference and estimate."""
 
     rotation: FloatArray
     """(3, 3) `estimate_R_reference`"""
@@ -51,7 +51,8 @@ class BodyRotation:
 def world_rotation_from_positions(matched: MatchedTrajectories) -> FloatArray | None:
     """Rotation of the worlds `reference_R_estimate` (3, 3) from paired positions; None where it is undetermined.
 
-    It is for a nearly straight path, whose second extent is below CLEARLY times the RMSE of the aligned positions.
+    It is undetermined for a nearly straight path, whose second extent is below CLEARLY times the RMSE of the aligned
+    positions, and for fewer than MIN_PAIRS pairs.
     """
     return _world_rotation(matched.estimate.world_T_body, matched.reference.world_T_body)
 
@@ -85,8 +86,8 @@ def rotation_misfit(reference: FloatArray, estimate: FloatArray, world: FloatArr
 def least_rotation_misfit(matched: MatchedTrajectories) -> float:
     """Least `rotation_misfit`, deg, of the estimate as it is, of its inverse poses, and of its transposed orientations.
 
-    If the estimate fits as it is, the others are not tried. The rotation between the two worlds is that which aligns
-    the positions; if they determine none, the estimate as it is takes that which aligns the orientations.
+    If the estimate fits as it is, the others are not tried. The worlds are aligned by the positions. Where these do not
+    determine the rotation, inverse or transposed poses are not tried, and the estimate is aligned by its orientations.
     """
     R_ref, poses = matched.reference.rotation, matched.estimate.world_T_body
     R = poses[:, :3, :3]
@@ -103,7 +104,10 @@ def least_rotation_misfit(matched: MatchedTrajectories) -> float:
 
 
 def travel_direction_misfit(position: FloatArray, rotation: FloatArray) -> float:
-    """Median angle, deg, of the direction of travel in the body to its median; of positions and rotations (n, 3, 3)."""
+    """Median angle, deg, between the direction of travel in the body frame and its median direction along the path.
+
+    `position` is (n, 3), m, and `rotation` world_R_body (n, 3, 3). NaN with fewer than MIN_PAIRS moving steps.
+    """
     steps = np.einsum("tji,tj->ti", rotation[:-1], np.diff(position, axis=0))
     length = np.linalg.norm(steps, axis=1)
     if len(length) < MIN_PAIRS:
@@ -121,7 +125,7 @@ def body_rotation(matched: MatchedTrajectories) -> BodyRotation | None:
     """Constant rotation between the bodies, by hand-eye calibration over the paired orientations.
 
     Minimizes the sum of |W R_est B - R_ref|^2 over rotations W of the world, initialized from the positions, and B of
-    the body, alternately in closed form. None where the positions leave W undetermined.
+    the body, alternately in closed form. None where the positions do not determine W.
     """
     world = world_rotation_from_positions(matched)
     if world is None:
@@ -139,7 +143,7 @@ def has_conjugated_orientations(matched: MatchedTrajectories) -> bool:
 
 
 def rmse_of_inverse_poses(matched: MatchedTrajectories) -> tuple[float, float]:
-    """RMSE of positions after SE(3) alignment, m, of the estimate and of its inverted poses."""
+    """RMSE of positions, m, of the estimate and of its inverse poses, each after SE(3) alignment."""
     reference = matched.reference.world_T_body
 
     def rmse(poses: FloatArray) -> float:
@@ -150,10 +154,10 @@ def rmse_of_inverse_poses(matched: MatchedTrajectories) -> tuple[float, float]:
 
 
 def length_unit(matched: MatchedTrajectories) -> tuple[str, float] | None:
-    """Unit in which one of two files has its positions while the other has meters, and the estimate's scale to it.
+    """Unit of the positions of one trajectory while the other is in meters, and the ratio of estimate to reference.
 
-    The scale is above 1 where the estimate has the larger numbers. None where it is no unit's, as of most monocular
-    estimates.
+    The ratio is above 1 where the estimate has the larger numbers. None where it is not that of a unit, as for most
+    monocular estimates.
     """
     if len(matched) < MIN_PAIRS:
         return None

@@ -5,7 +5,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray
 
 STANDING = 0.1
-"""share of the 90th percentile of step lengths, below which the direction of a step is noise: the last one is kept"""
+"""ratio to the 90th percentile of step lengths up to which a step is a standstill, and its direction noise"""
 
 
 def distance_traveled(positions: FloatArray) -> FloatArray:

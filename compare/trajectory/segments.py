@@ -128,7 +128,10 @@ def segment_errors(
 
 
 def fitted_lengths(path: float) -> tuple[float, ...]:
-    """Eight segment lengths, 1 to 8 times 1, 2, 2.5 or 5 times a power of ten, at most 0.9 of the path, m."""
+    """Eight segment lengths, 1 to 8 times 1, 2, 2.5 or 5 times a power of ten, at most 0.9 of the path, m.
+
+    Raises InputError for a path without length.
+    """
     if not path > 0:
         raise InputError("the reference stands still: it has no segments")
     wanted = 0.9 * path / 8.0

@@ -13,8 +13,9 @@ UNDETERMINED = 1e-12
 def solve_wahba(M: FloatArray, tie: Callable[[], FloatArray], floor: float) -> tuple[FloatArray, FloatArray | None]:
     """Proper rotation R (3, 3) that maximizes trace(R^T M), with M (3, 3) the sum of y x^T over vectors x rotated to y.
 
-    M leaves R undetermined where its singular values are below `floor`, or below UNDETERMINED of the largest. `tie()`
-    (3, 3) then takes its place among the equally good rotations, and after it the smallest angle decides.
+    M does not determine R where its singular values are below `floor`, or below UNDETERMINED of the largest. Then
+    `tie()` (3, 3) replaces M for the choice among the rotations of equal trace; if it does not determine R either, the
+    smallest angle decides.
 
     Also returns the axis (3,), in the frame of y, about which M leaves R undetermined: None if there is none, zero if
     all of R is undetermined.

@@ -1,4 +1,4 @@
-"""Body frame of an estimate brought to that of the reference: lever arm, extrinsic, constant rotation."""
+"""Transformation of an estimate to the body frame of the reference: lever arm, extrinsic, constant rotation."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from fgbaseline.data.formats.quaternion_order import fits_clearly_better
 from fgbaseline.geometry import FloatArray, InputError
 
 LEAST_MISFIT = 1e-3
-"""share of the reference's extent: paths with a smaller misfit are not inverted"""
+"""misfit as a share of the reference's extent, up to which inverse poses are not tested"""
 
 
 def moved_body(entry: Entry, body_T_other: FloatArray) -> Entry:
@@ -24,8 +24,8 @@ def moved_body(entry: Entry, body_T_other: FloatArray) -> Entry:
     path = entry.trajectory
     if not path.oriented:
         raise InputError(
-            f"{path.source or path.name}: it has no orientations, which carry the way from one body to another; leave "
-            "out the body, or swap the two files"
+            f"{path.source or path.name}: it has no orientations, which the change of the body frame needs; leave out "
+            "the body, or swap the two files"
         )
     covariance = entry.covariance
     if covariance is not None:
@@ -34,16 +34,16 @@ def moved_body(entry: Entry, body_T_other: FloatArray) -> Entry:
 
 
 def with_lever_arm(entry: Entry, arm: FloatArray) -> Entry:
-    """Poses of the point at `arm` (3,), m, in the body of an estimate, whose orientations carry it."""
+    """Poses of the point at `arm` (3,), m, in the body frame of an estimate."""
     body_T_point = np.eye(4)
     body_T_point[:3, 3] = arm
     shown = ", ".join(f"{x:g}" for x in arm)
     moved = moved_body(entry, body_T_point)
-    return moved.remarked(f"its positions are moved by the lever arm ({shown}) m, which its orientations carry")
+    return moved.remarked(f"its positions are moved by the lever arm ({shown}) m in its body frame")
 
 
 def with_length_unit_recognized(reference: Trajectory, entry: Entry, settings: Settings) -> Entry:
-    """The estimate with a remark where the positions of one of the two files are not in meters."""
+    """Estimate, with a remark if the positions of one of the two files are not in meters."""
     if settings.align == compare.Align.SIM3:
         return entry
     matched = paired(reference, entry.trajectory, settings, oriented=False)
@@ -59,7 +59,7 @@ def with_length_unit_recognized(reference: Trajectory, entry: Entry, settings: S
 
 
 def with_body_recognized(reference: Trajectory, entry: Entry, settings: Settings) -> Entry:
-    """The estimate with remarks on inverse poses, conjugated quaternions and a constant rotation between the bodies.
+    """Estimate, with a remark on inverse poses, conjugated quaternions or a constant rotation between the bodies.
 
     With `align_body` the rotation is removed.
     """
@@ -87,7 +87,7 @@ def with_body_recognized(reference: Trajectory, entry: Entry, settings: Settings
     )
     if not settings.align_body:
         return entry.remarked(
-            f"{rotation}; relative errors, drift and rotation errors have it in them: --align-body removes it"
+            f"{rotation}; relative errors, drift and rotation errors include it; --align-body removes it"
         )
     estimate_T_reference = np.eye(4)
     estimate_T_reference[:3, :3] = found.rotation

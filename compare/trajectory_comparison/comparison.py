@@ -1,4 +1,4 @@
-"""Estimates against a reference as plain data: what tables, sentences, figures and files are made of."""
+"""Results of a comparison as plain data, from which tables, sentences, figures and files are made."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,13 +33,13 @@ ASSUMED_UP = "assumed"
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Result(Displayed):
-    """Values of one estimate."""
+    """Metrics of one estimate against the reference."""
 
     entry: Entry
     matched: MatchedTrajectories
-    """the pairs of poses, the estimate's aligned"""
+    """pairs of poses, with the estimate aligned"""
     offset: TimeOffset | None
-    """the estimated time offset, where it was searched for"""
+    """estimated time offset; None without a search"""
     absolute: Columns
     """see `compare.absolute_errors`"""
     divergence: Columns
@@ -52,9 +52,9 @@ class Result(Displayed):
     shares: ErrorDecomposition
     share_intervals: ShareIntervals
     bound: float
-    """m: 1 % of the path, at most 5 m"""
+    """divergence threshold, m: 1 % of the path, at most 5 m"""
     passing: Exceedance | None
-    """first pose whose position is farther off than `bound`"""
+    """first pose whose position error exceeds `bound`; None without, or if the trajectories do not start together"""
     statistics: dict[str, ErrorStatistics]
     """statistics of the absolute errors `translation`, `rotation_deg` and `pose`"""
     relative_statistics: dict[str, dict[str, ErrorStatistics]]
@@ -84,14 +84,14 @@ class Result(Displayed):
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Comparison(Displayed):
-    """A reference, and the values of every estimate against it."""
+    """Reference, and the metrics of every estimate against it."""
 
     reference: Entry
     reference_pixels: "Pixels | None"
     results: dict[str, Result]
     """results by name, in the order of the input"""
     up: FloatArray
-    """(3,) in the reference's world"""
+    """(3,) unit vector that points up in the reference's world"""
     up_from: str
     """the source of `up`"""
     deltas: tuple[str, ...]
@@ -104,7 +104,7 @@ class Comparison(Displayed):
 
     @property
     def behind(self) -> dict[str, RmseDifference]:
-        """RMSE of each estimate above that of the nearest rival, which is missing."""
+        """RMSE of each ranked estimate minus that of the first, which has no entry."""
         return self.ranking.behind
 
     @property

@@ -31,19 +31,19 @@ if TYPE_CHECKING:
 Computed = TypeVar("Computed")
 
 FAR, FAR_SHARE = 5.0, 0.01
-"""m, and share of the path: an estimate farther off than the smaller of both has left the reference"""
+"""m, and share of the path: the smaller of both is the divergence threshold"""
 TILT = 10.0
-"""largest angle between the ups of two level worlds, deg"""
+"""deg, largest angle between the up directions of two worlds that count as gravity-aligned"""
 FEWEST = 2
-"""least number of pairs of poses"""
+"""smallest number of pose pairs of a comparison"""
 
 
 class PairedEntries(NamedTuple):
-    """Entries with their pairs of poses: what can be wrong with inputs has been found."""
+    """Entries with their pairs of poses, for inputs that passed all checks."""
 
     entries: Entries
     settings: Settings
-    """with the alignment and the deltas that are taken by default"""
+    """settings with defaults for alignment and deltas filled in"""
     up: FloatArray
     """(3,)"""
     up_from: str
@@ -68,7 +68,7 @@ def pair_entries(entries: Entries, settings: Settings) -> PairedEntries:
 
 
 def compare_paired(paired: PairedEntries) -> Comparison:
-    """Figures of all estimates."""
+    """Comparison with the metrics of all estimates."""
     entries, settings, up, up_from, _ = paired
     paths, pixels, held_out = _by_observations(entries, settings)
     results = {e.name: _compared(paired, e, paths, pixels.get(e.name)) for e in entries.estimates}
@@ -146,7 +146,7 @@ def _up_by_recording(problem: "Problem | None", path: Trajectory) -> FloatArray 
 
 
 def _require_one_up(entries: Entries, up: FloatArray) -> None:
-    """Raises InputError where up is another direction in the world of an estimate, by its file or the recording."""
+    """Raises InputError if up differs by more than TILT in the world of an estimate, by its file or the recording."""
     for entry in entries.estimates:
         there = entry.up if entry.up_stated else _up_by_recording(entries.problem, entry.trajectory)
         apart = 0.0 if there is None else _angle_deg(there, up)
@@ -242,7 +242,7 @@ def _map(
 def _passing(
     matched: MatchedTrajectories, divergence: Columns, bound: float, notes: dict[str, str]
 ) -> Exceedance | None:
-    """First pose beyond the bound; only of paths that start together."""
+    """First pose beyond the bound; None with a note if the alignment does not make the paths start together."""
     if matched.alignment.kind in (Align.NONE, Align.FIRST_POSE):
         return compare.first_exceedance(divergence, bound)
     notes["passing"] = f"it was {matched.alignment.caption}, so the trajectories do not start together"
@@ -258,7 +258,7 @@ def _relative(matched: MatchedTrajectories, delta: Delta, settings: Settings, no
 
 
 def _or_note(key: str, notes: dict[str, str], compute: Callable[[], Computed]) -> Computed | None:
-    """Result, or None with a note where the path does not allow it (too short, standing, without stamps)."""
+    """Result of `compute`, or None and the error as a note, as for a path that is too short or has no stamps."""
     try:
         return compute()
     except InputError as error:
@@ -269,7 +269,10 @@ def _or_note(key: str, notes: dict[str, str], compute: Callable[[], Computed]) -
 def matched_poses(
     reference: Entry, entry: Entry, up: FloatArray, settings: Settings
 ) -> tuple[MatchedTrajectories, TimeOffset | None]:
-    """Pairs of poses, aligned, and the time offset where it is searched for."""
+    """Pairs of poses, aligned, and the time offset if it is searched for.
+
+    Raises InputError if only one trajectory has time stamps, and for fewer than FEWEST pairs.
+    """
     there, here, kind = reference.trajectory, entry.trajectory, settings.align or Align.NONE
     if there.stamped != here.stamped:
         bare = there if here.stamped else here

@@ -1,4 +1,4 @@
-"""Conventions that trajectory files leave open, decided by the files beside them: time units, quaternion orders."""
+"""Time units and quaternion orders that a trajectory file does not state, decided by the other files."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,11 +17,11 @@ from fgbaseline.geometry import FloatArray, InputError, so3
 
 Source = ParsedTrajectory | Trajectory
 Times = Sequence[FloatArray]
-"""stamps, s, for files without: a file takes the first array that is as long as its trajectory"""
+"""stamps, s, for files without stamps: a file takes the first array that is as long as its trajectory"""
 FEWEST = 10
-"""least number of pairs of poses to judge quaternion orders by"""
+"""smallest number of pose pairs to decide quaternion orders"""
 VARIED, TURNED = np.deg2rad(1.0), np.deg2rad(10.0)
-"""rad: least angle between orientations that vary, and between those of a body on a curve"""
+"""rad; smallest angle from the first orientation that shows a rotation, and one that shows a turn of the path"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -74,9 +74,9 @@ class Resolved:
 
 
 def resolve(sources: Sequence[Source], times: Times, settings: Settings) -> list[Resolved]:
-    """Reference, which is the first source, and estimates, with their conventions decided by each other.
+    """Sources with their conventions decided; the first is the reference.
 
-    Raises InputError for units that nothing decides.
+    Raises InputError for time units that nothing decides.
     """
     _require_same_frames(sources, times)
     reference, *estimates = _with_units(sources, settings)
@@ -111,7 +111,7 @@ def _with_units(sources: Sequence[Source], settings: Settings) -> list[Resolved]
 
 
 def _spans(source: Source, wanted: TimeUnit | None) -> Spans:
-    """First and last stamp by the units that they may have; nothing without stamps."""
+    """First and last stamp, s, for each unit that the stamps may have; empty without stamps."""
     if isinstance(source, Trajectory):
         return {TimeUnit.S: (float(source.t[0]), float(source.t[-1]))} if source.stamped else {}
     if source.stamps is None:
@@ -138,7 +138,7 @@ def _with_unit(source: Source, unit: TimeUnit) -> Resolved:
 def _with_orders(
     reference: Resolved, estimates: Sequence[Resolved], times: Times, settings: Settings
 ) -> list[Resolved]:
-    """Quaternion orders: as a header or the user names them, else as fits clearly better, else as usual."""
+    """Inputs with quaternion orders: stated by header or user, else what fits clearly better, else the usual."""
     reference, *estimates = [_asked_for(each, settings.quaternion) for each in (reference, *estimates)]
     if settings.quaternion is not None:
         return [reference, *estimates]
@@ -172,7 +172,7 @@ def _asked_for(each: Resolved, order: Order | None) -> Resolved:
 def _misfits(reference: Resolved, estimate: Resolved, times: Times, settings: Settings) -> FloatArray | None:
     """Misfits of the rotations, deg: a row for each order of the reference, a column for each of the estimate.
 
-    Inverse poses and transposed orientations count in either order. None without orientations, and with too few pairs.
+    A misfit is the `least_rotation_misfit`. None without orientations, and with too few pairs.
     """
     if len(reference.orders) == len(estimate.orders) == 1:
         return None
@@ -225,7 +225,7 @@ def _of_inverse_poses(reference: Resolved, each: Resolved, times: Times, setting
 
 
 def _with_doubt(each: Resolved, assumed: float, other: float) -> Resolved:
-    """With a remark where the usual order fits hardly better than the other, as along straight paths."""
+    """Input, with a remark if the usual order does not fit clearly better than the other, as along straight paths."""
     if fits_clearly_better(assumed, other):
         return each
     orders = [in_words(order) for order in each.orders]

@@ -26,11 +26,11 @@ class Entry(Displayed):
     up_stated: bool = False
     """whether the file itself states `up`"""
     remarks: tuple[str, ...] = ()
-    """remarks on the file, each the rest of a sentence that begins with the name"""
+    """remarks on the file; each completes a sentence that begins with the trajectory's name"""
     trust: "Trust | None" = None
     """trust in a run's reference; None for files"""
     by_product: bool = False
-    """whether it is a by-product of the reference (isam2-online), near to it by construction"""
+    """whether it is a by-product of the reference (isam2-online) and close to it by construction"""
 
     @property
     def name(self) -> str:
@@ -51,8 +51,8 @@ class Entries(Displayed):
     problem: "Problem | None"
     """recording or problem whose observations are reprojected; None without"""
     held: "HeldOut | None"
-    """tracks that are in no problem, to judge all paths by"""
+    """held-out tracks, by which all paths are ranked"""
     up: FloatArray | None
-    """(3,) up in the reference's world, where it is that of a run"""
+    """(3,) up in the reference's world if that is the world of a run"""
     one_world: bool
     """whether reference and estimates share the world of a run"""

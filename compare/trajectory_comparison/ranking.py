@@ -13,7 +13,7 @@ from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray
 
 AT_MOST = 100_000_000
-"""errors that a bootstrap draws"""
+"""largest number of errors that a bootstrap draws"""
 REPETITIONS = 1000
 
 
@@ -26,11 +26,11 @@ class Ranking(Displayed):
     common: dict[str, ErrorStatistics]
     """statistics of the position errors over the pairs in `at`, m, by name, nearest first"""
     behind: dict[str, RmseDifference]
-    """RMSE of each rival above that of the nearest, which is missing"""
+    """RMSE of each of `rivals` minus that of the first, which has no entry"""
     rivals: tuple[str, ...]
-    """nearest first: all but by-products of the reference"""
+    """ranked estimates, smallest RMSE first, without by-products of the reference"""
     same: bool
-    """whether they are all the stamps of every estimate"""
+    """whether the common stamps are all stamps of every estimate"""
 
     @property
     def moments(self) -> int:
@@ -62,8 +62,8 @@ def ranking_of(
 ) -> Ranking:
     """Ranking by the RMSE of `errors` (n,) at increasing `stamps` (n,), s, of the reference.
 
-    Stamps within `tolerance`, s, are one moment where the estimates do not have the same ones. `statistics` are those
-    of all errors, where they are known already.
+    If the estimates do not have equal stamps, stamps within `tolerance`, s, count as equal. `statistics` are those of
+    all errors if already computed.
     """
     known = statistics or {}
     chosen = rankable({name: len(t) for name, t in stamps.items()})

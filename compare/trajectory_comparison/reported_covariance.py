@@ -12,7 +12,7 @@ from fgbaseline.data.display import Displayed
 from fgbaseline.geometry import FloatArray, InputError
 
 SINCE_FIRST = "both since the first pose"
-ALIGNED = "the alignment takes out a part of the errors"
+ALIGNED = "the alignment removes a part of the errors"
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -32,7 +32,7 @@ class ReportedCovariance(Displayed):
 
 
 def reported_covariance(reference: Entry, entry: Entry, matched: MatchedTrajectories) -> ReportedCovariance:
-    """Errors and NEES of each pair, the reference being taken for the truth.
+    """Errors and NEES of each pair of poses, with the reference as the truth.
 
     Without an alignment errors and covariances are used unchanged. With one, they are those of the motion since the
     first pose, where the covariances are of that kind (see `compare.covariance_since_first`): then the result does not

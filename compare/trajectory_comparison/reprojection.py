@@ -1,4 +1,4 @@
-"""Trajectories judged by the observations of a recording: reprojection, held-out tracks, landmarks, up."""
+"""Metrics of trajectories from the observations of a recording: reprojection, held-out tracks, landmarks; up."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -90,7 +90,7 @@ def map_of(
     there = Estimate(reference.name, paths[reference.name], problem.mask, landmarks=reference.landmarks)
     table = compare.map_difference(problem.sequence, aligned, there)
     if table.empty:
-        raise InputError(f"no landmark that {reference.name} has too is seen from a frame that both have a pose of")
+        raise InputError(f"no landmark that {reference.name} has too is observed in a frame for which both have a pose")
     return table
 
 

@@ -1,4 +1,4 @@
-"""Sample sizes and coverage of the values of an estimate, which a quality gate needs before it judges them."""
+"""Sample sizes and coverage of the metrics of an estimate, by which `check` decides if they can be judged."""
 
 import numpy as np
 
@@ -16,9 +16,9 @@ def coverage(comparison: Comparison, result: Result) -> float:
 
 
 def samples(comparison: Comparison, result: Result) -> dict[str, dict[str, float]]:
-    """Sample size `n` and `coverage` of the estimate's time, by the beginning of a metric's path.
+    """Sample size `n` and `coverage` of the estimate's time, by key, a prefix of the key path of a metric.
 
-    n counts pairs of poses; for the reprojection observations, for the map landmarks. Values that are not spread over
+    n counts pairs of poses, observations (reprojection) or landmarks (map). Values that are not spread over
     time have no coverage. Errors of relative motions also have the number of their `stretches`.
     """
     matched, whole = result.matched, result.entry.trajectory.t

@@ -1,4 +1,4 @@
-"""Settings of a comparison. Nothing heavy is imported: bad options are reported at once."""
+"""Settings of a comparison. The module imports nothing heavy, so that wrong options are reported at once."""
 
 import re
 from collections.abc import Iterable
@@ -82,7 +82,7 @@ class Settings:
     sequence: "Path | Sequence | Problem | None" = None
     """a recording, the folder of an exported problem, or either in memory"""
     held_out: float = 0.0
-    """share of the tracks of a recording to judge all paths by; a run that held some out has its own"""
+    """share of the tracks of a recording that is held out to rank all paths; a run with held-out tracks has its own"""
     extrinsic: "Path | FloatArray | None" = None
     """imu_T_cam (4, 4), or a KITTI file of one line; None for that of `sequence`"""
     reference_body: Body = "imu"

@@ -145,8 +145,9 @@ def _unpaired_poses(comparison: Comparison) -> list[str]:
 
 def _undetermined_alignments(comparison: Comparison) -> list[str]:
     return [
-        f"The positions of {result.name} do not determine {listed(free)} of the alignment; "
-        f"{listed('the scale is set to 1' if each == SCALE else f'{each} is from the orientations' for each in free)}."
+        f"Parameters of the alignment that the positions of {result.name} do not determine: "
+        + listed(f"{each} ({'set to 1' if each == SCALE else 'from the orientations'})" for each in free)
+        + "."
         for result in comparison.results.values()
         if (free := result.matched.alignment.free)
     ]

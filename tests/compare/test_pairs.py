@@ -101,7 +101,7 @@ def test_all_pairs_by_frames_are_exact_to_the_end() -> None:
         (float("nan"), "deg", "delta: expected a number above 0 of deg"),
         (1.5, "frames", "delta: expected a whole number above 0 of frames, got 1.5"),
         (181.0, "deg", "no two orientations are 181.0 degrees apart"),
-        (1e6, "m", "no two of the 20 poses are 1e[+]06 m apart; give a smaller one"),
+        (1e6, "m", "no two of the 20 poses are 1e[+]06 m apart; give a smaller delta"),
         (90.0, "deg", "no two of the 20 poses are 90 deg apart"),
     ],
 )
@@ -124,7 +124,9 @@ def test_errors_of_motions_are_in_the_body_and_of_poses_in_the_world() -> None:
     assert compare.absolute_pose_error(estimate, reference, "translation")[2] == pytest.approx(np.sqrt(5.0))
     assert compare.absolute_pose_error(estimate, reference, "rotation_chord")[1] == pytest.approx(2.0)
     for of_motions in ("distance", "distance_percent"):
-        with pytest.raises(InputError, match=f"{of_motions}: a measure of motions; a pose has translation, "):
+        with pytest.raises(
+            InputError, match=f"{of_motions}: defined for motions .RPE. only; for poses choose translation, "
+        ):
             compare.absolute_pose_error(estimate, reference, of_motions)
 
 
