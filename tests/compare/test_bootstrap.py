@@ -167,7 +167,7 @@ def test_pairs_without_a_difference_decide_nothing() -> None:
     assert not nothing.settled
     assert np.isnan([nothing.value, nothing.low, nothing.high]).all()
     assert (nothing.block, nothing.reliable) == (1, False)
-    with pytest.raises(InputError, match="same stamps"):
+    with pytest.raises(InputError, match="same n stamps"):
         compare.rmse_difference([1.0, 2.0], [1.0])
 
 
@@ -256,7 +256,7 @@ def test_moments_that_one_of_the_two_lacks_are_left_out() -> None:
     found = compare.rmse_difference([3.0, np.nan, 3.0, 3.0], [1.0, 1.0, np.nan, 1.0])
     assert (found.value, found.low, found.high, found.block) == (2.0, 2.0, 2.0, 1)
     assert found.settled
-    with pytest.raises(InputError, match="same stamps"):
+    with pytest.raises(InputError, match="same n stamps"):
         compare.rmse_difference([[1.0]], [[1.0]])
 
 

@@ -86,7 +86,7 @@ def test_the_parts_of_the_path_add_up() -> None:
     assert np.isnan(table["percent_of_path"].iloc[0])
     assert parts["from_m"].iloc[0] == 0.0
     assert parts["to_m"].iloc[-1] == table["traveled"].iloc[-1]
-    with pytest.raises(InputError, match="a trajectory at rest cannot be split"):
+    with pytest.raises(InputError, match="expected a reference that moves"):
         compare.divergence_growth(compare.divergence_along_path(matched(winding(), np.tile(np.eye(4), (N, 1, 1)))))
 
 
@@ -254,7 +254,7 @@ def test_growth_of_a_known_case() -> None:
     assert len(compare.divergence_growth(table)) == 10
     assert compare.divergence_growth(table)["frames"].sum() == 5
     for parts_wanted in (0, -1):
-        with pytest.raises(InputError, match="fewer than 1 part"):
+        with pytest.raises(InputError, match="at least 1 part"):
             compare.divergence_growth(table, parts_wanted)
 
 

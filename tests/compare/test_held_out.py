@@ -108,7 +108,7 @@ def test_without_observations_the_ranking_is_empty_and_without_paths_there_is_no
     errors = compare.held_out_errors(sequence, nothing, {"true": true_path()}, 0.25)
     assert errors.pieces == errors.inliers == 0
     assert compare.held_out_ranking(errors).empty
-    with pytest.raises(FgbaselineError, match="at least one trajectory"):
+    with pytest.raises(FgbaselineError, match="no trajectory to evaluate"):
         compare.held_out_errors(sequence, out, {}, 0.25)
 
 
