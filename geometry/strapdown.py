@@ -102,7 +102,7 @@ def _pieces(phi: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]
 def integrate(
     angular_velocity: FloatArray, specific_force: FloatArray, dt: FloatArray, densities: FloatArray
 ) -> PreintegratedImu:
-    """Motion over n pieces, `dt` (n,) s, of angular velocity (n, 3), rad/s, and specific force (n, 3), m/s^2, unbiased.
+    """Motion over n pieces, `dt` (n,) s; angular velocities (n, 3), rad/s, specific forces (n, 3), m/s^2, without bias.
 
     `densities` (4,): noise density and random walk of the gyroscope (rad/s/sqrt(Hz), rad/s^2/sqrt(Hz)), then of the
     accelerometer (m/s^2/sqrt(Hz), m/s^3/sqrt(Hz)). White noise is constant over a piece, with variance

@@ -49,7 +49,7 @@ class Alignment(Displayed):
     translation: FloatArray = field(default_factory=lambda: np.zeros(3))
     """(3,) m"""
     scale: float = 1.0
-    """ratio of reference to estimate; 1 unless `kind` is SIM3"""
+    """length of the reference over that of the estimate; 1 unless `kind` is SIM3"""
     n: int = 0
     """number of pose pairs used"""
     available: int = 0
@@ -109,7 +109,7 @@ def align(
     yaw uses it.
 
     Positions in one point, on a line or in a plane may not determine the rotation. Of the rotations with equal cost,
-    the one that brings the orientations nearest to the reference's is taken; it does not depend on the world frames.
+    the one that brings the orientations nearest to the reference's is taken, whatever the world frames are.
 
     Raises InputError for an unknown kind or a `first` outside 1 to n, and FgbaselineError without pairs.
     """
@@ -122,7 +122,7 @@ def align(
         raise FgbaselineError(f"alignment needs paired poses, got {estimate.shape} and {reference.shape}")
     n = len(estimate)
     if first is not None and not 1 <= first <= n:
-        raise InputError(f"alignment: it was to use the first {first} pose pairs, expected a number from 1 to {n}")
+        raise InputError(f"alignment over the first {first} pose pairs: expected a number from 1 to {n}")
     if kind is Align.NONE:
         return Alignment(n=0, available=n)
     used = 1 if kind is Align.FIRST_POSE else (first or n)

@@ -204,7 +204,7 @@ def test_a_degenerate_alignment_is_refused_with_its_reason() -> None:
         InputError, match=r"'se4' is not a kind of alignment; choose one of none, first-pose, yaw, se3, sim3"
     ):
         pair.aligned("se4")
-    with pytest.raises(InputError, match="the first 16 pose pairs, expected a number from 1 to 15"):
+    with pytest.raises(InputError, match="the first 16 pose pairs: expected a number from 1 to 15"):
         pair.aligned("se3", first=16)
     with pytest.raises(InputError, match="it is aligned already"):
         pair.aligned("se3").aligned("se3")

@@ -368,7 +368,7 @@ BAD: dict[str, Bad] = {
     "first": (
         ("truth.tum", "near.csv"),
         {"align_first": 10_000},
-        "the first 10000 pose pairs, expected a number from 1 to",
+        "the first 10000 pose pairs: expected a number from 1 to",
     ),
 }
 
