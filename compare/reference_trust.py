@@ -86,7 +86,7 @@ class Trust(Displayed):
     reasons: tuple[str, ...]
     criteria: tuple[Criterion, ...] = ()
     against: tuple[str, ...] = ()
-    """those of the reasons that exceed a limit; empty where that is not known"""
+    """reasons that exceed a limit; empty where that is not known"""
 
     def _heading(self) -> str:
         return f"Trust: {self.verdict.name.lower()}"
