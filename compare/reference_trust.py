@@ -13,7 +13,7 @@ import numpy as np
 from fgbaseline.data import Estimate, EventKind, Problem, Status
 from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import BoolArray
-from fgbaseline.data.wording import distance, number, per_cent, plural
+from fgbaseline.data.wording import distance, limit_per_cent, number, per_cent, plural
 from fgbaseline.geometry import disparity
 from fgbaseline.geometry.monocular_camera import UNIT_LENGTH
 
@@ -85,6 +85,8 @@ class Trust(Displayed):
     verdict: Verdict
     reasons: tuple[str, ...]
     criteria: tuple[Criterion, ...] = ()
+    against: tuple[str, ...] = ()
+    """reasons that exceed a limit; empty where that is not known"""
 
     def _heading(self) -> str:
         return f"Trust: {self.verdict.name.lower()}"
@@ -191,7 +193,7 @@ def trust(
         ),
     ]
     in_batch = _compared_with_batch(problem, reference, batch, limit)
-    findings = [(criterion.verdict, text) for criterion, text in judged if text]
+    findings = [(criterion.verdict, text + _limit_of(criterion, text)) for criterion, text in judged if text]
     if not problem.diagnosed:
         findings.append((Verdict.TRUSTED, "the recording was not diagnosed: its noise is assumed"))
     findings.append((in_batch.verdict, in_batch.reason))
@@ -200,14 +202,22 @@ def trust(
         max(verdict for verdict, _ in findings),
         tuple(text for _, text in findings),
         (*(criterion for criterion, _ in judged), *in_batch.criteria),
+        tuple(text for verdict, text in findings if verdict is not Verdict.TRUSTED),
     )
+
+
+def _limit_of(criterion: Criterion, text: str) -> str:
+    """Limit of trust that a share exceeds, in parentheses; empty where it holds and where `text` has it."""
+    if criterion.verdict is Verdict.TRUSTED or "limit" in text:
+        return ""
+    return f" (limit {limit_per_cent(criterion.doubtful)})"
 
 
 def inflation_remark(problem: Problem) -> str:
     """Clause on the inflation of the pixel noise; empty below `NOTABLE_INFLATION`."""
     if problem.pixel_inflation < NOTABLE_INFLATION:
         return ""
-    return f"the pixel sigma is inflated by {problem.pixel_inflation:.3g} for time-correlated track errors"
+    return f"the pixel sigma is inflated by a factor of {problem.pixel_inflation:.3g} for time-correlated track errors"
 
 
 def _criterion(limits: TrustLimits, code: str, value: float, remark: str = "") -> Criterion:

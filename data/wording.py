@@ -25,6 +25,13 @@ def listed(items: Iterable[str]) -> str:
     return " and ".join([", ".join(every[:-1]), every[-1]] if len(every) > 1 else every)
 
 
+def capitalized(text: str) -> str:
+    """Text as a sentence begins: a symbol or name as first word, such as `uR` or `isam2`, keeps its letters."""
+    first = text.partition(" ")[0]
+    is_name = any(c.isupper() or c.isdigit() or c == "_" for c in first)
+    return text if is_name else f"{text[:1].upper()}{text[1:]}"
+
+
 def vector(values: Iterable[float], digits: int) -> str:
     """`(0.10, −0.20, 0.30)`."""
     return f"({', '.join(f'{value:.{digits}f}' for value in values)})".replace("-", MINUS)

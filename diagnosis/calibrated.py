@@ -128,7 +128,7 @@ def _diagnosed(found: Diagnosis, features: int | None, repairs: Repairs) -> Prob
     repaired = repair(diagnosis, mask, tracks)
     noise = diagnosis.sigmas or NoiseSettings()
     inflation = 1.0 if found.fit is None or repairs.sigma.pixel is not None else found.fit.inflation.pixel
-    white = f" ({inflation:.1f} times that from frame to frame)" if inflation > 1.0 else ""
+    white = f" ({inflation:.1f} times the noise from frame to frame)" if inflation > 1.0 else ""
     remarks = (
         *((f"not diagnosed: {found.failure_reason}",) if found.failure_reason else ()),
         f"noise {_origin(found, repairs)}: {noise.pixel:.2f} px{white}, {noise.linear_velocity:.3f} m/s and "

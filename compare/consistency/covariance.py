@@ -15,6 +15,8 @@ HELD = 1e-11
 """m^2 or rad^2; a covariance whose largest entry is at most this is that of a pose held fixed"""
 ROUNDING = 1e-13
 """eigenvalue of a correlation matrix up to which it counts as zero"""
+SEMIDEFINITE = 1e-9
+"""share of the largest entry of a matrix up to which a negative eigenvalue is rounding"""
 SINCE_FIRST_SHARE = 0.5
 """smallest share of positive definite P_k - A_k P_0 A_k^T, for covariances to count as grown from the first pose's"""
 
@@ -29,6 +31,8 @@ class CovarianceState(IntEnum):
     NOT_POSITIVE_DEFINITE = 2
     """indefinite, singular or asymmetric"""
     POSITIVE_DEFINITE = 3
+    PARTLY_HELD = 4
+    """first pose whose position alone is held fixed, as with raw inertial samples: it has no NEES"""
 
 
 def covariance_state(estimate: Estimate) -> NDArray[np.uint8]:
@@ -44,7 +48,18 @@ def covariance_state(estimate: Estimate) -> NDArray[np.uint8]:
         is_positive_definite(P), CovarianceState.POSITIVE_DEFINITE, CovarianceState.NOT_POSITIVE_DEFINITE
     )
     state[k[np.abs(P).max(axis=(1, 2), initial=0.0) <= HELD]] = CovarianceState.HELD
+    if (state[:1] == CovarianceState.NOT_POSITIVE_DEFINITE).any() and _has_held_position(estimate.covariance[0]):
+        state[0] = CovarianceState.PARTLY_HELD
     return state
+
+
+def _has_held_position(P: FloatArray) -> bool:
+    """Whether a covariance (6, 6) is zero up to HELD outside of its rotation, and positive semidefinite there."""
+    rotation, rest = P[3:, 3:], P.copy()
+    rest[3:, 3:] = 0.0
+    scale = np.abs(rotation).max()
+    symmetric = np.abs(rotation - rotation.T).max() <= 1e-6 * scale
+    return bool(np.abs(rest).max() <= HELD and symmetric and np.linalg.eigvalsh(rotation)[0] >= -SEMIDEFINITE * scale)
 
 
 def is_positive_definite(P: FloatArray) -> NDArray[np.bool_]:

@@ -51,7 +51,7 @@ def pose_sigma(estimate: Estimate) -> PoseSigma:
     sigma = np.full((T, 2), np.nan)
     state = covariance_state(estimate)
     if estimate.covariance is not None:
-        k = np.flatnonzero(state == CovarianceState.POSITIVE_DEFINITE)
+        k = np.flatnonzero(np.isin(state, (CovarianceState.POSITIVE_DEFINITE, CovarianceState.PARTLY_HELD)))
         variance = np.einsum("nii->ni", estimate.covariance[k])
         sigma[k] = np.sqrt(np.stack([variance[:, :3].sum(axis=1), variance[:, 3:].sum(axis=1)], axis=1))
         sigma[state == CovarianceState.HELD] = 0.0

@@ -84,7 +84,7 @@ def _moving(sequence: Sequence, tracks: TrackStatistics) -> list[Finding]:
         return []
     text = (
         f"{tracks.moving:,} of {plural(n_tracks, 'track')} contradict the motion in {MOVING_MATCHES} or more "
-        "consecutive intervals: moving objects, or tracks that slide."
+        "consecutive intervals: moving objects, or tracks that drift."
     )
     return [_counted("moving", text, tracks.moving, tracks.moving_after, "tracks")]
 

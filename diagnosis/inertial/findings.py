@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.problem.imu_gaps import sample_gaps
 from fgbaseline.data.sequence import Sequence
-from fgbaseline.data.wording import plural
+from fgbaseline.data.wording import capitalized, plural
 
 from ..findings.track_findings import track_findings
 from ..findings.track_statistics import TrackStatistics, track_statistics
@@ -52,7 +52,7 @@ def scale_findings(start: MonocularStart) -> tuple[Finding, ...]:
     if start.excited:
         return ()
     share = np.inf if start.window is None else start.window.solution.scale_sigma
-    sentence = start.remark[0].upper() + start.remark[1:] + "."
+    sentence = f"{capitalized(start.remark)}."
     return (Finding("scale_not_excited", sentence, share, share, "1", f"1-sigma, {EXCITED:g} is allowed"),)
 
 

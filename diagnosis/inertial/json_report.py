@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from fgbaseline.data.finding import Finding
-from fgbaseline.data.wording import vector
+from fgbaseline.data.wording import capitalized, vector
 
 from ..findings.json_report import header
 from .findings import inertial_findings
@@ -104,7 +104,7 @@ def inertial_sentences(found: InertialDiagnosis) -> tuple[str, ...]:
         )
     if found.monocular is not None:
         remark = found.monocular.remark
-        sentences.append(f"{remark[0].upper()}{remark[1:]}.")
+        sentences.append(f"{capitalized(remark)}.")
     if found.pixel_found:
         sentences.append(f"Noise (1-sigma): {found.pixel:.2f} px of a pixel row.")
     return tuple(sentences)

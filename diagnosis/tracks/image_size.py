@@ -4,6 +4,7 @@ import numpy as np
 
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.sequence import Sequence
+from fgbaseline.data.wording import capitalized
 from fgbaseline.geometry import FloatArray
 
 MIN_OBSERVATIONS = 200
@@ -53,7 +54,7 @@ def intrinsics_findings(sequence: Sequence) -> tuple[Finding, ...]:
     if ratio == 1.0:
         return ()
     text = _mismatch(sequence)
-    return (Finding("intrinsics", f"{text[0].upper()}{text[1:]}.", ratio, ratio, "times", "the observed pixels"),)
+    return (Finding("intrinsics", f"{capitalized(text)}.", ratio, ratio, "times", "the observed pixels"),)
 
 
 def _mismatch(sequence: Sequence) -> str:

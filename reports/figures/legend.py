@@ -29,7 +29,8 @@ BELOW_REFERENCE = 1.9
 def title_and_legend(figure: Figure, title: str, handles: Iterable[Any] = (), style: Style = SCREEN) -> None:
     """Title on top of a figure (not on paper), in lines, and below it one legend: each label once, in rows.
 
-    Called when the panels are drawn. On the screen the lower ones of lines that coincide become wider.
+    Called when the panels are drawn. The title of a panel names the lines that are not seen, as all their values are
+    below its logarithmic ordinate. On the screen the lower ones of lines that coincide become wider.
     """
     by_label = {str(handle.get_label()): handle for handle in handles}
     figure.set_label(title)
@@ -45,8 +46,24 @@ def title_and_legend(figure: Figure, title: str, handles: Iterable[Any] = (), st
         **({"borderpad": 0.2, "alignment": "left", **bold} if style.titled else {}),
     )
     legend.get_title().set_color("#222222")
+    for axes in figure.axes:
+        _name_lines_below(axes)
     for axes in figure.axes if style.titled else []:
         _widen_coinciding(axes)
+
+
+def _name_lines_below(axes: Axes) -> None:
+    if axes.get_yscale() != "log":
+        return
+    below = []
+    for line in axes.get_lines():
+        y = np.asarray(line.get_ydata(), dtype=np.float64)
+        known = y[np.isfinite(y)]
+        if not str(line.get_label()).startswith("_") and len(known) and known.max() < axes.get_ylim()[0]:
+            below.append(str(line.get_label()))
+    if below:
+        title = filter(None, [axes.get_title(loc="left"), f"below the axis: {' and '.join(below)}"])
+        axes.set_title(", ".join(title), loc="left")
 
 
 def _legend_columns(widths: Sequence[int], room: int) -> int:

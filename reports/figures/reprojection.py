@@ -124,7 +124,7 @@ def reprojection_classes(run: RunData) -> Figure | None:
         log_where_positive(panel)
     panels[0].set_ylabel("median error, px")
     handles += _track_chi_square(panels[2], run.run, list(classes), run.line())
-    title_and_legend(figure, "Reprojection errors by class, and tracks against chi-square", handles)
+    title_and_legend(figure, "Reprojection errors by class, and chi-square of the tracks", handles)
     return figure
 
 

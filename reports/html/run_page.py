@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data.tracking import Pictures
+from fgbaseline.data.wording import capitalized
 
 from ..figures import EncodedFigure
 from ..figures.palette import colors
@@ -37,8 +38,8 @@ from .rendering import render_page
 
 CAPTIONS: Mapping[str, str] = {
     "paths_overlaid": "Seen from above; all have the same start. Squares mark the ends.",
-    "paths_side_by_side": "All panels have the same limits. Green dots: landmarks. Dashed: ground truth. Without "
-    "it the thin line is the reference.",
+    "paths_side_by_side": "All panels have the same limits. Green dots: landmarks. Thin line: ground truth "
+    "(dashed) or, without it, the reference.",
     "divergence": "Position and rotation difference from the reference, without alignment, and the position "
     "difference ahead of the reference, to its left and above it.",
     "error_to_truth": "Difference from ground truth in the same components, without alignment: all have the start of "
@@ -58,7 +59,8 @@ CAPTIONS: Mapping[str, str] = {
     "consistent filter is at least 1 (dotted line).",
     "reprojection_classes": "Flat lines mean that the error does not depend on distance or track age. The "
     "dotted curve is expected if the noise is as assumed. Curves to its left have smaller residuals, as with inflated "
-    "pixel noise; curves to its right larger ones.",
+    "pixel noise; curves to its right larger ones. Errors include those of masked observations, which can dominate a "
+    "class of few observations.",
     "image_regions": "Errors that grow towards an edge can indicate distortion or a wrong rectification; near points "
     "at the bottom of the image and wrong matches raise them as well. All panels share "
     "one logarithmic scale.",
@@ -192,7 +194,7 @@ def _behind(run: Run, plots: Mapping[str, Any] | None) -> list[Block]:
     found = counted(len(findings.rows), "fault") + " detected" if findings.rows else "no fault detected"
     inner: list[Block] = [Grid(findings, "plain findings")] if findings.rows else []
     if problem.repairs:
-        repairs = [f"{repair[0].upper()}{repair[1:]}." for repair in problem.repairs]
+        repairs = [f"{capitalized(repair)}." for repair in problem.repairs]
         inner += [Note("Repairs (the same for all estimators)", is_heading=True), Sentences(repairs, "repairs")]
     title = f"The recording: {found if problem.diagnosed or findings.rows else 'it could not be diagnosed'}"
     return [*blocks, Folded(title, inner, "diagnosis", is_open=bool(findings.rows))]

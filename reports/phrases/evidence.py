@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
-from fgbaseline.data.wording import plural
+from fgbaseline.data.wording import capitalized, plural
 
 from ..formatting import grouped, limit_per_cent, listed, number
 
@@ -20,8 +20,8 @@ DEGREES_OF_FREEDOM = 6
 FIRST = 6
 """sentences of a verdict that stand above the table"""
 MEANING: Mapping[str, str] = {
-    "doubtful": "a small divergence from it counts, a large one may be its own error",
-    "untrusted": "divergence from it does not measure accuracy",
+    "doubtful": "A small divergence from it counts, a large one may be its own error",
+    "untrusted": "Divergence from it does not measure accuracy",
 }
 """consequence of a verdict other than `trusted`"""
 
@@ -35,16 +35,18 @@ def overconfidence_bound() -> float:
 
 
 def reference_sentence(name: str, trust: "Trust", *, is_compared: bool = True) -> str:
-    """Trust in a reference with its first reason where it is trusted, else with three and what follows from it."""
+    """Trust in a reference with its first reason where it is trusted, else with those against it and what follows."""
     word = trust.verdict.name.lower()
     if word == "trusted" and trust.criteria:
         n = len(trust.criteria)
-        first = f"{trust.reasons[0][0].upper()}{trust.reasons[0][1:]}"
-        return f"The reference, {name}, is trusted ({n} of {plural(n, 'criterion', 'criteria')}). {first}."
-    reasons = "; ".join(trust.reasons[:3])
+        return (
+            f"The reference, {name}, is trusted ({n} of {plural(n, 'criterion', 'criteria')}). "
+            f"{capitalized(trust.reasons[0])}."
+        )
+    reasons = "; ".join((trust.against or trust.reasons)[:3])
     if word == "trusted" or not is_compared:
         return f"The reference, {name}, is {word}: {reasons}."
-    return f"The reference, {name}, is {word}: {reasons}; {MEANING[word]}."
+    return f"The reference, {name}, is {word}: {reasons}. {MEANING[word]}."
 
 
 def causal_estimate(reference: str) -> str:

@@ -133,8 +133,8 @@ def _maximum_divergence(run: Run) -> list[str]:
             if r.divergence is not None
         },
         {
-            name: f"from {onset.seconds:.1f} s (frame {onset.frame}) on"
-            + ("" if onset.beyond == 1.0 else f", in {per_cent(onset.beyond)} of the frames")
+            name: ("" if onset.beyond == 1.0 else f"in {per_cent(onset.beyond)} of the frames ")
+            + f"from {onset.seconds:.1f} s (frame {onset.frame}) on"
             for name, onset in found.items()
         },
     )
@@ -143,8 +143,8 @@ def _maximum_divergence(run: Run) -> list[str]:
     if wrong and overall is not None:
         each = listed(f"{per_cent(share)} ({name})" for name, share in wrong.items())
         sentences.append(
-            f"Share of the observations that the mask excluded as {SUSPECTED}, within {AROUND:g} s of the first frame "
-            f"above the threshold: {each}; in the whole recording {per_cent(overall)}."
+            f"Within {AROUND:g} s of the first frame above the threshold, the mask excluded {each} of the observations "
+            f"as {SUSPECTED}; in the whole recording {per_cent(overall)}."
         )
     return sentences
 

@@ -256,10 +256,11 @@ def reference_nees_sentences(run: Run) -> list[str]:
     each = [f"{name} {number(nees)}" for name, nees in medians.items() if nees > overconfidence_bound()]
     if not each:
         return []
-    small = "Its pose covariance is" if len(each) == 1 else "Their pose covariances are"
+    its, small = ("Its", "covariance is") if len(each) == 1 else ("Their", "covariances are")
     return [
-        f"Median reference NEES above {number(overconfidence_bound())} (97.5 % quantile of one pose), though the "
-        f"position sigma is not below the RMSE: {listed(each)}. {small} too small in single directions or in rotation."
+        f"Median reference NEES: {listed(each)}; threshold {number(overconfidence_bound())} (97.5 % quantile of one "
+        f"pose). {its} position sigma covers the divergence, but the pose {small} too small in rotation or in a single "
+        "direction."
     ]
 
 
@@ -279,7 +280,7 @@ def _claim(run: Run, result: Result) -> str:
     if _claimed(result) >= distance:
         return (
             f"{result.name} differs from {other} by {number(distance)} m (RMSE{measured}), less than its position "
-            f"sigma of {claimed} m (RMS), but its covariance is too small in single directions or in rotation"
+            f"sigma of {claimed} m (RMS), but its covariance is too small in rotation or in a single direction"
         )
     return (
         f"{result.name} claims a position sigma of {claimed} m (RMS) but differs from {other} by {number(distance)} m "

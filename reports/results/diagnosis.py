@@ -116,5 +116,5 @@ def _noise(diagnosis: Diagnosis) -> str:
     else:
         text += f"{sigma.pixel:.2f} px for a pixel coordinate."
     if fit.inflation.velocity > 1.0:
-        text += f" Velocity sigma: inflated by {fit.inflation.velocity:.1f} for time-correlated errors."
+        text += f" Velocity sigma: inflated by a factor of {fit.inflation.velocity:.1f} for time-correlated errors."
     return text

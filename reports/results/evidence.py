@@ -31,7 +31,9 @@ class CovarianceCount(Part):
     """Validity of the pose covariances."""
 
     frames: Annotated[int, Field(description="with a covariance, valid or not")]
-    held: Annotated[int, Field(description="with a covariance of zero, such as the fixed first pose")]
+    held: Annotated[
+        int, Field(description="of a pose that is fixed, such as the first; from raw inertial data that one in part")
+    ]
     not_positive_definite: int
     where: Annotated[str, Field(description="frames that are not positive definite, such as '3, 7 to 9'")]
 
@@ -207,7 +209,7 @@ def _covariance(evidence: Evidence) -> dict[str, int | str]:
     bad = np.flatnonzero(state == CovarianceState.NOT_POSITIVE_DEFINITE)
     return {
         "frames": int(np.sum(state != CovarianceState.ABSENT)),
-        "held": int(np.sum(state == CovarianceState.HELD)),
+        "held": int(np.isin(state, (CovarianceState.HELD, CovarianceState.PARTLY_HELD)).sum()),
         "not_positive_definite": len(bad),
         "where": frame_ranges(bad),
     }

@@ -28,9 +28,9 @@ TERMS: Mapping[str, str] = {
     "comparison: distance from the reference after the alignment of --align.",
     SIGMA: "Square root of the trace of an estimator's own position covariance, m, with the start fixed (pose of frame "
     "0; with raw inertial data its position and heading); RMS over the frames. It is the expected 3D RMSE, not the "
-    "sigma of one axis. The sentences at the top call an estimator overconfident if its median NEES is above 14.4 "
-    "(97.5 % quantile of one pose), or if its position sigma is below its divergence and, beside that, its median "
-    "reference NEES is above 14.4 or P_ref exceeds 1.1 P in some direction in most frames.",
+    "sigma of one axis. The sentences at the top call an estimator overconfident in two cases. Its median NEES is "
+    "above 14.4 (97.5 % quantile of one pose); or its position sigma is below its divergence, and either its median "
+    "reference NEES is above 14.4 or, in most frames, P_ref exceeds 1.1 P in some direction.",
     DIVERGENCE: "Distance of the positions from those of the reference, m, without alignment: all have the same start.",
     RPE: "Error of the motion between two poses a delta apart (--delta), m and °.",
     "drift": "Relative error over a tenth of the path length (or duration), per meter (or second).",

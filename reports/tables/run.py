@@ -22,8 +22,8 @@ from .table import Cell, Column, Row, Table, best
 OVERCONFIDENT = "overconfident"
 """in place of a reference NEES, for which P - P_ref has to be positive definite"""
 NOT_POSITIVE_DEFINITE = (
-    "in most frames P_ref exceeds 1.1 P in some direction, although the reference uses at least the same data (P: its "
-    "covariance; P_ref: that of the reference)"
+    "in most frames P_ref exceeds 1.1 P in some direction, although the reference uses at least the same data (P: "
+    "covariance of the estimator; P_ref: of the reference)"
 )
 NOT_DEFINED = "P − P_ref is not positive definite in the others"
 Estimators = Mapping[str, Mapping[str, Any]]

@@ -120,15 +120,25 @@ class Table:
         return ((group, list(rows)) for group, rows in groupby(self.rows, key=lambda row: row.group))
 
     def transposed(self, name: str = "") -> "Table":
-        """A row for each column, under the titles of their groups, and a column for each row; the caption follows."""
+        """A row for each column, under the titles of their groups, and a column for each row; the caption follows.
+
+        The marks of the notes are in alphabetical order from row to row.
+        """
         columns = tuple(Column(_name(row)) for row in self.rows)
         cells = [row.cells or (Cell(DASH),) * len(self.columns) for row in self.rows]
         rows = tuple(
             Row(column.heading, tuple(of[i] for of in cells), group=column.group, term=column.term)
             for i, column in enumerate(self.columns)
         )
+        marks = dict.fromkeys(cell.note for row in rows for cell in row.cells if cell.note)
+        renamed = dict(zip(marks, sorted(marks, key=lambda mark: (len(mark), mark)), strict=True))
+        rows = tuple(
+            replace(row, cells=tuple(cell._replace(note=renamed.get(cell.note, "")) for cell in row.cells))
+            for row in rows
+        )
+        notes = tuple(sorted((renamed.get(mark, mark), text) for mark, text in self.notes))
         caption = self.caption.replace("Best of a column", "Best of a row")
-        return replace(self, columns=columns, rows=rows, name=name, caption=caption)
+        return replace(self, columns=columns, rows=rows, name=name, caption=caption, notes=notes)
 
 
 def mark_best(better: Better, values: Mapping[str, Value], rivals: Collection[str]) -> dict[str, Cell]:

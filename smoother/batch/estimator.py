@@ -136,7 +136,7 @@ def _costs(minima: list[LocalMinimum], last: int, *, both: bool) -> Event:
     """Event with the costs from all starts."""
     costs = " and ".join(f"{minimum.cost:,.8g} from a start at {minimum.start}" for minimum in minima)
     if not both:
-        return Event(last, EventKind.STARTED_AT_ISAM2, f"the final cost is {costs}")
+        return Event(last, EventKind.STARTED_AT_ISAM2, f"no second start was requested; the final cost is {costs}")
     if len(minima) == 1:
         return Event(
             last,

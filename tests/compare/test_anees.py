@@ -89,6 +89,25 @@ def test_a_covariance_is_held_absent_or_not_positive_definite() -> None:
     assert (compare.covariance_state(replace(estimate, covariance=None)) == S.ABSENT).all()
 
 
+def test_the_first_pose_alone_may_have_a_fixed_position_and_an_uncertain_rotation() -> None:
+    estimate, _ = random_walk(0)
+    assert estimate.covariance is not None
+    P = estimate.covariance.copy()
+    P[:2] = 0.0
+    P[:2, 3:5, 3:5] = 1e-4 * np.eye(2)  # tilt; heading is fixed
+    state = compare.covariance_state(replace(estimate, covariance=P))
+    assert state[:2].tolist() == [CovarianceState.PARTLY_HELD, CovarianceState.NOT_POSITIVE_DEFINITE]
+    sigma = compare.pose_sigma(replace(estimate, covariance=P))
+    assert sigma.position[0] == 0.0
+    np.testing.assert_allclose(sigma.rotation_deg[0], np.rad2deg(np.sqrt(2e-4)))
+    for bad in (-1e-4, np.inf):
+        P[0, 5, 5] = bad
+        assert compare.covariance_state(replace(estimate, covariance=P))[0] in (
+            CovarianceState.ABSENT,
+            CovarianceState.NOT_POSITIVE_DEFINITE,
+        )
+
+
 def test_nees_shows_a_rigid_motion_that_an_alignment_would_remove() -> None:
     """Truth and estimate differ by one rigid motion: after alignment the error is zero, and NEES must show it."""
     estimate, _ = random_walk(0)

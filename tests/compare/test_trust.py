@@ -181,10 +181,8 @@ def test_impossible_observations_are_counted_and_named() -> None:
     broken = replace(problem, sequence=sequence, excluded=excluded)
     verdict = compare.trust(broken, replace(reference(), used=reference().used & ~rest))
     assert verdict.verdict is Verdict.UNTRUSTED
-    assert any(
-        reason.endswith("of the observations have no positive disparity, though every point in view has one")
-        for reason in verdict.reasons[:2]
-    )
+    said = "of the observations have no positive disparity, though every point in view has one (limit 20 %)"
+    assert any(reason.endswith(said) for reason in verdict.reasons[:2])
 
 
 def test_a_path_with_missing_poses_is_no_evidence_and_not_trusted() -> None:
@@ -267,7 +265,7 @@ def test_six_observations_are_enough_for_a_frame_and_five_are_not() -> None:
     for n, weak in ((6, False), (5, True)):
         problem = plain_problem(Scene(n_points=n).sequence())
         reasons = compare.trust(problem, true_answer(problem)).reasons
-        assert ("100 % of the frames have fewer than 6 used observations" in reasons) == weak
+        assert ("100 % of the frames have fewer than 6 used observations (limit 5 %)" in reasons) == weak
         assert any("fewer than 6" in reason for reason in reasons) == weak
 
 
@@ -279,7 +277,8 @@ def test_intervals_without_common_landmarks_are_reported() -> None:
     for seen, untied in ((3, 7), (8, 2), (10, 0)):
         reasons = compare.trust(problem, replace(answer, used=answer.used & (frame < seen))).reasons
         pairs = f"{untied} of 9 pairs of consecutive frames ({per_cent(untied / 9)})"
-        assert (f"{pairs} {said}" in reasons) == (untied > 0)
+        limit = " (limit 25 %)" if untied / 9 > 0.25 else ""
+        assert (f"{pairs} {said}{limit}" in reasons) == (untied > 0)
         assert any("no used landmark in common" in reason for reason in reasons) == (untied > 0)
     limits = TrustLimits(*[(np.inf, np.inf)] * 2, (0.0, 0.0), (1.0, 1.0), given_up_frames=(1.0, 1.0))
     verdicts = [
@@ -336,3 +335,11 @@ def test_the_worst_criterion_decides_the_verdict_and_each_has_its_value_beside_i
     pixel = next(c for c in tight.criteria if c.code == "pixel_scale")
     assert tight.verdict is pixel.verdict is Verdict.UNTRUSTED
     assert pixel.value == pytest.approx(pixel_scale(clean(), reference()))
+
+
+def test_what_speaks_against_a_reference_has_its_limit_and_is_apart_from_the_other_reasons() -> None:
+    found = compare.trust(clean(), reference(), limits=TrustLimits(weak_frames=(0.05, 0.9), weak_below=10**6))
+    assert found.verdict is Verdict.UNTRUSTED
+    assert found.against == ("100 % of the frames have fewer than 1000000 used observations (limit 5 %)",)
+    assert found.reasons[0] == found.against[0]
+    assert compare.trust(clean(), reference()).against == ()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fgbaseline import compare, data
-from fgbaseline.data.wording import noun, plural
+from fgbaseline.data.wording import capitalized, noun, plural
 from fgbaseline.geometry import se3
 from fgbaseline.reports.comparison import compare as compared
 from fgbaseline.reports.formatting import counted, number, per_cent
@@ -16,6 +16,12 @@ def test_a_count_of_one_has_a_singular() -> None:
     assert [plural(n, "frame") for n in (0, 1, 2, 1009)] == ["0 frames", "1 frame", "2 frames", "1,009 frames"]
     assert [noun(n, "match", "matches") for n in (1, 2)] == ["match", "matches"]
     assert counted(1, "error is", "errors are") == "1 error is"
+
+
+def test_a_sentence_begins_with_a_capital_unless_its_first_word_is_a_symbol_or_a_name() -> None:
+    texts = ("velocities shifted", "uR reduced by 0.33 px", "isam2 used 3", "w_y is zero", "", "7 tracks")
+    begun = ["Velocities shifted", "uR reduced by 0.33 px", "isam2 used 3", "w_y is zero", "", "7 tracks"]
+    assert list(map(capitalized, texts)) == begun
 
 
 def test_a_share_that_is_nearly_nothing_is_not_printed_in_full() -> None:

@@ -76,6 +76,23 @@ def assert_legend_is_whole(name: str, figure: Figure) -> None:
         assert 0.0 <= box.x0 <= box.x1 <= figure.bbox.x1, (name, text.get_text())
 
 
+def test_a_line_below_a_logarithmic_axis_is_named_above_the_panel() -> None:
+    with in_style():
+        figure = Figure(figsize=(SCREEN.width, 3.0))
+        shown, cut = figure.subplots(1, 2)
+        lines = [
+            panel.plot([1.0, y], label=name) for panel in (shown, cut) for name, y in (("ekf", 2.0), ("batch", 1e-5))
+        ]
+        for panel in (shown, cut):
+            panel.set_yscale("log")
+        cut.get_lines()[1].set_ydata([1e-5, 1e-6])
+        cut.set_ylim(0.1, 3.0)
+        shown.set_ylim(0.1, 3.0)
+        title_and_legend(figure, "Divergence", [line for each in lines for line in each])
+    assert shown.get_title(loc="left") == ""
+    assert cut.get_title(loc="left") == "below the axis: batch"
+
+
 def test_on_the_screen() -> None:
     with in_style():
         for name, figure in drawn_ten().items():

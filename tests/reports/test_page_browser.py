@@ -131,6 +131,10 @@ def test_a_frame_shows_the_outcome_of_each_observation_and_its_true_reprojection
     assert math.isclose(shown, float(table["error"].median()), rel_tol=0.01)
     assert "3 × contradicts the motion of its track" in opened.text(".frame-summary")
     used = opened.page.inner_html('[data-side="left"]')
+    color = "e => getComputedStyle(e).stroke"
+    for mark in ("measured", "predicted"):
+        drawn = opened.page.eval_on_selector(f'[data-side="left"] .used .{mark}', color)
+        assert opened.page.eval_on_selector(f"#frame-view .marks .{mark}.sample", color) == drawn
     opened.page.select_option("#frame-view select", "2")
     assert opened.page.inner_html('[data-side="left"]') != used
 

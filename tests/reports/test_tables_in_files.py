@@ -1,5 +1,6 @@
 """Tables of a run in files: what the page shows beside a cell stands there too, under the same words."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -23,6 +24,15 @@ def test_notes_of_cells_are_in_the_files() -> None:
     assert r"overconfident\textsuperscript{a} & \textbf{20.1}\textsuperscript{b}" in text
     assert text.index(r"\end{tabular}") < text.index(r"\textsuperscript{b} over 54 of 1,009 frames.")
     assert text.index(r"over 54") < text.index(r"\end{table}")
+
+
+def test_the_marks_of_notes_are_in_the_order_of_reading() -> None:
+    rows = (Row("ekf", (Cell("1.0"), Cell("–", note="a"))), Row("isam2", (Cell("–", note="b"), Cell("2.0"))))
+    table = Table((Column("NEES"), Column("NIS")), rows, notes=(("a", "no innovations"), ("b", "the reference")))
+    turned = table.transposed()
+    assert [cell.note for row in turned.rows for cell in row.cells] == ["", "a", "b", ""]
+    assert turned.notes == (("a", "the reference"), ("b", "no innovations"))
+    assert turned.transposed() == replace(table, columns=turned.transposed().columns, name="")
 
 
 def test_captions_and_limits_of_the_files_are_those_of_what_they_show(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ class FrameView {
       place.querySelector(`[data-side="${side}"]`).append(image);
       return image;
     });
+    this.marks = place.querySelector(".marks");
     this.words = place.querySelector(".frame-summary");
     this.select = place.querySelector("select");
     for (const trajectory of trajectories.values()) {
@@ -54,6 +55,7 @@ class FrameView {
   draw() {
     const key = this.select.value;
     const seen = this.seen();
+    this.marks.className = key ? `marks estimator-${key}` : "marks";
     this.images.forEach((image, side) => this.drawImage(image, side, seen, key));
     this.summarize(seen, key);
   }
