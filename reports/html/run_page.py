@@ -127,7 +127,8 @@ def render(
 
 def _about(run: Run, sequence: Mapping[str, Any], problem: Mapping[str, Any]) -> str:
     length = sequence["path_length_m"]
-    spans = [f"{number(sequence['duration_s'])} s", *([] if length is None else [f"{number(length)} m"])]
+    source = "" if run.problem.sequence.truth is None else " by ground truth"  # not that of the reference
+    spans = [f"{number(sequence['duration_s'])} s", *([] if length is None else [f"{number(length)} m{source}"])]
     kind = "observation" if run.problem.sequence.monocular else "stereo observation"
     return (
         f"{', '.join(run.results)} on {counted(sequence['frames'], 'frame')} ({', '.join(spans)}) with "

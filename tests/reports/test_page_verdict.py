@@ -11,9 +11,10 @@ from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Event, EventKind, Excluded, Observations
 from fgbaseline.reports.formatting import number, per_cent
 from fgbaseline.reports.html.plot_data import page_data
+from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.phrases.run import verdict
 
-from ..builders.runs import RECOVERED, answer, failed, partly_known, run_of, scene, standard_run
+from ..builders.runs import RECOVERED, answer, as_dict, failed, partly_known, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem
 
 
@@ -263,3 +264,11 @@ def test_gaps_of_a_path_are_reported() -> None:
     broken.world_T_imu[50:] = np.nan
     run = run_of(problem, broken, answer(problem, "isam2"))
     assert "ekf has no pose in 10 of 60 frames." in verdict(run)
+
+
+def test_the_heading_names_the_path_whose_length_it_has() -> None:
+    run = standard_run()
+    assert run.problem.sequence.truth is not None
+    assert " m by ground truth) with " in render(run, as_dict(run), {})
+    alone = replace(run, problem=replace(run.problem, sequence=replace(run.problem.sequence, truth=None)))
+    assert "by ground truth) with" not in render(alone, as_dict(alone), {})
