@@ -1,7 +1,7 @@
 """Sentences on ATE, divergence, and the position sigma that overconfident estimators claim beside their error.
 
 A difference is claimed only where it is significant: where the 95 % interval of the paired block bootstrap excludes
-zero, over the frames in which all estimators have a pose, and the printed values differ. The causal estimate of the
+zero, over the frames in which all estimators have a pose, and one is at least 1 % larger. The causal estimate of the
 reference and other solvers of its graph do not compete with it: their divergence is reported, and they are not ranked.
 """
 
@@ -26,7 +26,7 @@ from fgbaseline.data import EventKind
 from fgbaseline.data.wording import noun, plural
 from fgbaseline.geometry import FloatArray
 
-from ..formatting import counted, distance, listed, number, per_cent, resolved
+from ..formatting import counted, distance, limit_per_cent, listed, number, per_cent, resolved
 from ..results.metric_registry import ate_resolution
 from .evidence import causal_estimate, no_difference, overconfidence_bound
 
@@ -34,13 +34,20 @@ IN_FULL = 3
 """overconfident estimators with their values; of the others only the names"""
 FEW = 2
 """differences whose intervals stand in a sentence"""
+MIN_DIFFERENCE = 0.01
+"""smallest difference of two RMSE that is claimed, as a share of the smaller: paired errors make less significant, but
+it has no consequence"""
 WITHIN_SIGMAS = 3.0
 """sigmas of the reference up to which an order by divergence says nothing on accuracy"""
 
 
 def is_claimed(difference: RmseDifference, larger: float, smaller: float) -> bool:
-    """Whether an RMSE is significantly larger than another, and printed as a larger number."""
-    return difference.settled and difference.value > 0.0 and larger > smaller and number(larger) != number(smaller)
+    """Whether an RMSE is larger than another, significantly and by more than `MIN_DIFFERENCE`."""
+    return difference.settled and difference.value > 0.0 and larger > smaller and not _is_level(larger, smaller)
+
+
+def _is_level(larger: float, smaller: float) -> bool:
+    return larger <= (1.0 + MIN_DIFFERENCE) * smaller
 
 
 def ate_sentences(run: Run) -> list[str]:
@@ -72,7 +79,8 @@ def _against_reference(run: Run, errors: dict[str, np.ndarray]) -> list[str]:
     own, text = found.rmse[reference], {n: resolved(value, ate_resolution(run)) for n, value in found.rmse.items()}
     smaller = [name for name in found.rmse if name != reference and found.rmse[name] < own]
     pairs = {name: rmse_difference(*_common(errors, (reference, name), found)) for name in smaller}
-    equal = [name for name in smaller if text[name] == text[reference]]
+    level = [name for name in smaller if _is_level(own, found.rmse[name])]
+    equal = [name for name in smaller if name in level or text[name] == text[reference]]
     better = [name for name in smaller if name not in equal and is_claimed(pairs[name], own, found.rmse[name])]
     over = _over(run, found)
     sentences = []
@@ -85,9 +93,8 @@ def _against_reference(run: Run, errors: dict[str, np.ndarray]) -> list[str]:
         )
     sentences += no_difference(reference, [name for name in smaller if name not in (*better, *equal)], "ATE", over)
     if equal:
-        sentences.append(
-            f"The ATE of {listed([*equal, reference])} is the same to the printed digits{over}: not ranked."
-        )
+        same = f"within {limit_per_cent(MIN_DIFFERENCE)}" if equal == level else "to the printed digits"
+        sentences.append(f"The ATE of {listed([*equal, reference])} is the same {same}{over}: not ranked.")
     return sentences
 
 
@@ -135,13 +142,15 @@ def _ranked(run: Run, rivals: dict[str, Result], found: PairedRanking) -> list[s
     over = f"RMSE over a path length of {number(path_length(rivals[first]))} m{_over(run, found)}{_unranked(run)}"
     larger = [name for name in others if is_claimed(found.behind[name], found.rmse[name], found.rmse[first])]
     level = [name for name in others if name not in larger]
-    equal = [name for name in level if number(found.rmse[name]) == number(found.rmse[first])]
+    equal = [name for name in level if _is_level(found.rmse[name], found.rmse[first])]
     is_smallest = bool(larger) and not level
     title = "Smallest divergence" if is_smallest else "Divergence"
     sentences = [f"{title} from {run.reference} ({over}): {each([first, *level])}."]
     sentences += no_difference(first, [name for name in level if name not in equal], "divergence")
     if equal:
-        sentences.append(f"The divergence of {listed([first, *equal])} is the same to the printed digits.")
+        sentences.append(
+            f"The divergence of {listed([first, *equal])} is the same within {limit_per_cent(MIN_DIFFERENCE)}."
+        )
     if larger:
         uncertain = _uncertain({(name, first): found.behind[name] for name in larger})
         sentences.append(f"Larger divergence than {first}, by paired bootstrap: {each(larger)}.{uncertain}")
