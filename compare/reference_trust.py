@@ -86,7 +86,7 @@ class Trust(Displayed):
     reasons: tuple[str, ...]
     criteria: tuple[Criterion, ...] = ()
     against: tuple[str, ...] = ()
-    """reasons that exceed a limit; empty where that is not known"""
+    """reasons whose own verdict is not TRUSTED; empty also where reasons have none (a failure, a saved run)"""
 
     def _heading(self) -> str:
         return f"Trust: {self.verdict.name.lower()}"
@@ -207,7 +207,7 @@ def trust(
 
 
 def _limit_of(criterion: Criterion, text: str) -> str:
-    """Limit of trust that a share exceeds, in parentheses; empty where it holds and where `text` has it."""
+    """Limit that a share violates, in parentheses; empty if it violates none, or if `text` states the limit."""
     if criterion.verdict is Verdict.TRUSTED or "limit" in text:
         return ""
     return f" (limit {limit_per_cent(criterion.doubtful)})"

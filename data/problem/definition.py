@@ -44,7 +44,7 @@ class Excluded(IntEnum):
     COPIED = 8
     """copy of the previous frame: never tracked"""
     START = 9
-    """the start in motion of one camera was found with it: it does not count twice"""
+    """used to find the start of a recording by one camera that begins in motion: it does not count twice"""
 
 
 WRONG_MATCH = (Excluded.ROWS, Excluded.PREDICTION, Excluded.GEOMETRY, Excluded.MOVING)
@@ -173,10 +173,10 @@ class Problem(Displayed):
 
     @property
     def of_chosen_features(self) -> BoolArray:
-        """Mask (n,) of the sequence's observations of chosen features, masked ones included; all if none was left out.
+        """Mask (n,) of the sequence's observations of chosen features, masked ones included.
 
-        `excluded` alone does not decide: a masked observation has the code of its mask, whether or not its feature is
-        chosen.
+        All are True if no feature was left out. `excluded` alone does not decide: a masked observation has the code of
+        its mask, whether or not its feature is chosen.
         """
         if not (self.excluded == Excluded.FEATURE_NOT_CHOSEN).any():
             return np.ones(len(self.excluded), dtype=np.bool_)

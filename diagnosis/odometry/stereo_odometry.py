@@ -160,6 +160,7 @@ def _whitened_block(camera: StereoCamera, segments: _Block, R: FloatArray, p: Fl
     whitened = _forward_substituted(_cholesky(_point_noise(segments, along)), along)
     A = np.empty((3, 7, len(x)))
     A[:, :3], A[:, 6] = whitened[:, :3], whitened[:, 3]
+    # rotation w: M exp(delta) moves the point s = (x, y, z) by w x s, in the axes of s
     A[:, 3] = y * A[:, 2] - z * A[:, 1]
     A[:, 4] = z * A[:, 0] - x * A[:, 2]
     A[:, 5] = x * A[:, 1] - y * A[:, 0]
@@ -167,7 +168,10 @@ def _whitened_block(camera: StereoCamera, segments: _Block, R: FloatArray, p: Fl
 
 
 def _point_noise(segments: _Block, along: FloatArray) -> FloatArray:
-    """Square root B (3, 3, n) of the covariance B B^T of predicted rows, with derivatives along[:, :3] by the point."""
+    """Square root B (3, 3, n) of the covariance B B^T of predicted rows, with derivatives along[:, :3] by the point.
+
+    Its columns belong to the noise of uL, of uR, and of the mean of vL and vR, 1 px in each pixel coordinate.
+    """
     B = np.empty((3, 3, along.shape[2]))
     B[:, 1] = (along[:, :3] * segments.by_disparity).sum(axis=1)
     B[:, 0] = along[:, 0] * segments.by_column - B[:, 1]

@@ -184,7 +184,8 @@ class JointFilter:
             return False
         before = state.xi[:, 2].copy()
         self._apply_correction(correction)
-        if self.depths is not None:  # errors of inverse depths are in proportion to the scale
+        if self.depths is not None:
+            # What known inverse depths change by together is a change of scale, and multiplies the errors of all.
             state.scale_inverse_depths(state.slot_of[state.landmarks], common_change(before, state))
         self.used[linearized.observed[gated.accepted]] = True
         if not state.P.diagonal().min() >= 0.0:
@@ -212,8 +213,9 @@ class JointFilter:
     ) -> tuple[_LinearizedObservations, FloatArray, FloatArray]:
         """Move accepted landmarks of unknown depth to what the frame shows (`observed_depths`), and linearize there.
 
-        The observations are those of the same order, with their variances (n, r), px^2, and the mean (size,) of the
-        error about the estimate that has been moved; residuals are those of the prior.
+        Returns the observations in the order given, their variances (n, r), px^2, and the mean (size,) of the prior's
+        error about the moved estimate. Residuals are at this mean: measured - predicted - H mean. Moved landmarks have
+        the second-order terms of their covariance after the observation.
         """
         state, slot = self.state, linearized.H.slot
         mean = np.zeros(state.size)
@@ -221,31 +223,21 @@ class JointFilter:
         at = np.flatnonzero(unknown & (state.xi[slot, 2] > 0.0))
         if len(at) == 0:
             return linearized, variance, mean
-        own, noise = slot[at], self.row_variance / gated.weight[at, None]
-        measured, before = self.measured[linearized.observed[at]], state.xi[own]
-        found = observed_depths(
-            self.camera,
-            self.cam_T_imu,
-            state.body,
-            state.charts[own],
-            before,
-            state.pose_and_landmark(own),
-            measured,
-            noise,
-        )
-        move, offset = np.zeros(state.size), mean[state.n_body :].reshape(-1, 3)
-        move[state.n_body :].reshape(-1, 3)[own] = found.xi - before
+        own = slot[at]
+        charts, before, covariance = state.charts[own], state.xi[own], state.pose_and_landmark(own)
+        measured, noise = self.measured[linearized.observed[at]], self.row_variance / gated.weight[at, None]
+        shown = observed_depths(self.camera, self.cam_T_imu, state.body, charts, before, covariance, measured, noise)
+        move = np.zeros(state.size)
+        move[state.n_body :].reshape(-1, 3)[own] = shown.xi - before
         self._apply_correction(move)
-        state.scale_inverse_depths(own, found.scale)
-        offset[own] = found.mean
+        state.scale_inverse_depths(own, shown.scale)
+        mean[state.n_body :].reshape(-1, 3)[own] = shown.mean
         moved = self._linearize(linearized.observed)
         by_mean = moved.H.multiply(mean[:, None]).reshape(moved.residual.shape)
-        terms = second_order(
-            self.camera, self.cam_T_imu, state.pose, state.charts[own], state.xi[own], found.covariance
-        )
+        terms = second_order(self.camera, self.cam_T_imu, state.pose, charts, state.xi[own], shown.covariance)
         variance = variance.copy()
         after = self.row_variance + terms.variance + terms.mean**2
-        variance[at] = np.where(found.found[:, None], after, variance[at])
+        variance[at] = np.where(shown.in_front[:, None], after, variance[at])
         return moved._replace(residual=moved.residual - by_mean), variance, mean
 
     def _inflate_process_noise(
@@ -280,9 +272,8 @@ class JointFilter:
         state, slot = self.state, self.state.slot_of[self.feature[index]]
         charts = state.charts[slot]
         linearized = latest = predict(self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot]))
-        if (
-            self.settings.linearization is Linearization.FIRST_ESTIMATE
-        ):  # Jacobians only; residuals are at the latest estimate
+        if self.settings.linearization is Linearization.FIRST_ESTIMATE:
+            # Jacobians only; residuals are at the latest estimate
             linearized = predict(
                 self.camera, self.cam_T_imu, state.predicted.pose, homogeneous(charts, state.first_estimate[slot])
             )

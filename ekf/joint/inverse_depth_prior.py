@@ -58,9 +58,10 @@ def scene_depth(prior: InverseDepthPrior, state: JointState, cam_T_imu: FloatArr
 
 
 def common_change(before: FloatArray, state: JointState) -> float:
-    """Factor by which an update has changed the known inverse depths together; `before` (count,) it.
+    """Factor by which an update has changed the known inverse depths together.
 
-    Known landmarks count by the square of their relative accuracy; 1 where they are few.
+    `before` (count,), 1/m, are the inverse depths in all slots before it. Known landmarks count by the square of their
+    relative accuracy; 1 where they are few.
     """
     known = _known(state)
     known = known[before[known] > 0.0]

@@ -1,10 +1,11 @@
 """Kernel weights of the observations in an iSAM2 tree, from residuals at the estimate.
 
-A robust factor of GTSAM has the weight of its residual at the linearization point. The relinearization thresholds allow
-this residual to be larger than that at the estimate by several sigmas: a pose may be relinearized, and a landmark that
-it observes not. The weight is then too small, and so is the information: by a few percent with raw inertial data, where
-the tree relinearizes seldom (`ISAM2Settings.weights_at_estimate`). In the tree an observation is then a Gaussian factor
-with its kernel weight. The weights of recent observations are renewed where the tree relinearizes.
+A robust factor of GTSAM has the weight of its residual at the linearization point. Where a pose has been relinearized
+and a landmark that it observes has not, this residual may be larger than that at the estimate by several sigmas. The
+weight is then too small, and so is the information: by a few percent with raw inertial data, where the tree
+relinearizes seldom (docs/mathematics/graph.md). With `ISAM2Settings.weights_at_estimate`, observations in the tree are
+therefore Gaussian factors with their kernel weights. An update that relinearizes first renews the weights of the
+observations in the last `ISAM2Settings.recent_frames` frames.
 """
 
 from collections.abc import Mapping
@@ -27,7 +28,7 @@ def changed_weights(
     """Kernel weights of the observations `observed` (n,) at the estimate of the tree, where they differ from
     `builder.weight`, by observation.
 
-    `key` has the keys of their landmarks. Landmarks and frames must be in the tree.
+    `key` maps a landmark to its key in the tree, which must have their landmarks and frames.
     """
     o = builder.observations.select(observed)
     frames, at_frame = np.unique(o.frame, return_inverse=True)

@@ -83,7 +83,7 @@ def test_an_observed_depth_does_not_depend_on_the_one_before_the_less_the_prior_
         answer = observed_depths(
             run.camera, run.cam_T_imu, state.body, state.charts[slot], xi, P, run.measured[index], variance
         )
-        assert answer.found.all()
+        assert answer.in_front.all()
         found.append(answer.xi[:, 2])
     seen_well = np.sqrt(answer.covariance[:, 8, 8]) < 0.2 * answer.xi[:, 2]
     assert np.count_nonzero(seen_well) > 10
