@@ -146,7 +146,7 @@ class JointFilter:
         variance = self._variance(linearized)
         innovation = Innovation.of(linearized.H, linearized.residual, state.P)
         gated = self._gate(innovation.nis_per_observation(variance))
-        mean = np.zeros(state.size)
+        mean, prior = np.zeros(state.size), state.xi.copy()
         if self.depths is not None:
             linearized, variance, mean = self._at_observed_depths(self.depths, linearized, variance, gated)
             innovation = Innovation.of(linearized.H, linearized.residual, state.P)
@@ -180,7 +180,7 @@ class JointFilter:
             correction = mean + kalman_update(innovation, factor, state.P)
         except NotPositiveDefiniteError:
             self._record_rejection(k, EventKind.COVARIANCE_LOST, gated.accepted)
-            self._apply_correction(mean)
+            self._restore_landmarks(prior)
             return False
         before = state.xi[:, 2].copy()
         self._apply_correction(correction)
@@ -192,6 +192,15 @@ class JointFilter:
             negative = "P - W^T W has a negative variance after the update"
             self.events.append(Event(k, EventKind.COVARIANCE_LOST, negative))
         return True
+
+    def _restore_landmarks(self, xi: FloatArray) -> None:
+        """Undo `_at_observed_depths`: landmarks get their coordinates xi (count, 3) back, and P its prior value."""
+        state = self.state
+        slot = np.flatnonzero((state.xi != xi).any(axis=1))
+        state.scale_inverse_depths(slot, xi[slot, 2] / state.xi[slot, 2])
+        move = np.zeros(state.size)
+        move[state.n_body :] = (xi - state.xi).ravel()
+        self._apply_correction(move)
 
     def _variance(self, linearized: _LinearizedObservations) -> FloatArray:
         """Variances (n, r), px^2, of the noise of innovations.

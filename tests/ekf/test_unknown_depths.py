@@ -6,6 +6,7 @@ import pytest
 from fgbaseline import ekf, smoother
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.ekf.joint.filter import JointFilter
+from fgbaseline.ekf.joint.gating import GatedObservations
 from fgbaseline.ekf.joint.settings import JointSettings
 from fgbaseline.ekf.joint.state import JointState
 from fgbaseline.ekf.joint.unknown_depths import observed_depths
@@ -61,6 +62,24 @@ def test_a_correction_takes_unobservable_directions_to_themselves() -> None:
     run._apply_correction(np.random.default_rng(1).normal(size=state.size) * np.minimum(sigma, 0.05))
     N = unobservable(state)
     np.testing.assert_allclose(state.P, N @ N.T, atol=1e-9 * np.abs(N @ N.T).max())
+
+
+def test_a_rejected_update_leaves_the_prior() -> None:
+    problem = simulated_problem("drone", 3, seconds=2.0, cameras="left")
+    run = run_until(problem, 1)
+    (*_, seen) = list(problem.observations().by_frame(problem.n_frames))[:2]
+    run._predict(1)
+    index = np.arange(seen.start, seen.stop)
+    linearized = run._linearize(index[run.state.slot_of[run.feature[index]] >= 0])
+    variance = run._variance(linearized)
+    accepted = np.ones(len(linearized.observed), dtype=np.bool_)
+    xi, P = run.state.xi.copy(), run.state.P.copy()
+    assert run.depths is not None
+    run._at_observed_depths(run.depths, linearized, variance, GatedObservations(accepted, np.ones(len(accepted))))
+    assert np.count_nonzero(run.state.xi[:, 2] != xi[:, 2]) > 10
+    run._restore_landmarks(xi)
+    np.testing.assert_allclose(run.state.xi, xi, rtol=1e-12)
+    np.testing.assert_allclose(run.state.P, P, rtol=1e-6, atol=1e-12)
 
 
 def test_an_observed_depth_does_not_depend_on_the_one_before_the_less_the_prior_says() -> None:
