@@ -86,13 +86,18 @@ def refusal(checked: Checked, path: Path, *, accepted: bool = False) -> str:
         return f"{shown(path)}: not written, since {violated_limits(checked)}; correct that, or use --accept-worse"
     if checked.shortages:
         return f"{shown(path)}: not written. {checked.shortages[0]}"
-    return f"{shown(path)}: not written, since the reference is not trusted enough; the run's report has the reasons"
+    if checked.undecided:
+        return (
+            f"{shown(path)}: not written, since the reference is not trusted enough; the run's report has the reasons"
+        )
+    line = next(line for line in checked.lines if line.outcome is Outcome.UNDECIDED)
+    return f"{shown(path)}: not written, since {line.metric} of {line.estimator} is undecided: {line.reason}"
 
 
 def write_baseline(checked: Checked, path: Path) -> str:
     """Writes the new baseline atomically and returns a sentence on it.
 
-    Raises InputError where a sample is too small, a reference is not trusted enough, or a metric has no value.
+    Raises InputError where a sample is too small, a reference is not trusted enough, or a limit is undecided.
     """
     if checked.shortages or checked.undecided or checked.count[Outcome.UNDECIDED]:
         raise InputError(refusal(checked, path, accepted=True))

@@ -249,6 +249,15 @@ def test_no_baseline_comes_from_an_untrusted_reference(accept_worse: bool, tmp_p
     assert not (tmp_path / "baseline.json").exists()
 
 
+def test_no_baseline_without_ground_truth_names_the_metric_that_needs_it(tmp_path: Path) -> None:
+    blind = estimator(ate=None) | {"ate": None, "notes": {"ate": "the recording has no ground truth"}}
+    write(tmp_path, summary(isam2=estimator(0.1), ekf=blind, joint_ekf=estimator(0.3)), LIMITS)
+    undecided = r"not written, since ate\.rmse of ekf is undecided: the recording has no ground truth"
+    with pytest.raises(InputError, match=undecided):
+        held(tmp_path, update=True, accept_worse=True)
+    assert not (tmp_path / "baseline.json").exists()
+
+
 def test_no_baseline_holds_what_is_no_number(tmp_path: Path) -> None:
     write(tmp_path, BAD, LIMITS)
     with pytest.raises(InputError, match=r"joint-ekf has no ate\.rmse for the baseline: the estimator failed"):
