@@ -65,12 +65,12 @@ def repair(diagnosis: Diagnosis, mask: MaskSettings, tracks: TrackRepairs | None
     scale, tracks = significant_scale(diagnosis), tracks or TrackRepairs()
     velocity = sequence.linear_velocity @ linear.matrix.T / scale
     rate = (sequence.angular_velocity - bias) @ angular.matrix.T
+    if bias.any():
+        done.append(f"gyroscope bias of {vector(bias, 4)} rad/s, in the recorded axes, subtracted")
     if angular.changed:
         done.append(f"angular velocity rotated from the recorded axes ({angular.name}) to the IMU axes of imu_T_cam")
     if linear.changed:
         done.append(f"linear velocity rotated from the recorded axes ({linear.name}) to the IMU axes of imu_T_cam")
-    if bias.any():
-        done.append(f"gyroscope bias of {vector(bias, 4)} rad/s subtracted")
     if scale != 1.0:
         done.append(f"linear velocity divided by {scale:.4g}")
     imu_T_cam = sequence.imu_T_cam.copy()
@@ -186,7 +186,10 @@ def renumbered_tracks(sequence: Sequence, split: SplitTracks, gate: float) -> Re
     pieces, done = split.n_landmarks - sequence.n_landmarks, tuple[str, ...]()
     if pieces:
         n = len(np.unique(o.landmark))
-        done = (f"tracks split where they jump to another point: {n + pieces:,} tracks from {n:,}",)
+        done = (
+            "tracks split where they jump to another point (wrong matches; the mask excludes new tracks that are too "
+            f"short): {n + pieces:,} tracks from {n:,}",
+        )
     return RepairedTracks(moved, split.n_landmarks, split.excluded[order], gate, done)
 
 

@@ -36,6 +36,6 @@ def render(found: Found, figures: Mapping[str, Figure]) -> str:
                 Section("unknown", "Not identifiable in this recording", unknown, "Not identifiable"),
                 Section("figures", "Figures", list(pictures(figures, CAPTIONS).values())),
             ],
-            settings={"Recording": {"name": sequence.name, "source": sequence.source, "form": sequence.form}},
+            settings={"Recording": {"name": sequence.name, "source": sequence.source, "format": sequence.form}},
         )
     )

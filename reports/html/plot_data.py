@@ -204,5 +204,5 @@ def _bookmarks(run: Run) -> list[dict[str, Any]]:
     if worst is not None:
         t = run.problem.sequence.t
         middle = int(np.argmin(np.abs(t - t[0] - worst.second - 0.5)))
-        bookmarks.append({"frame": middle, "text": "most wrong matches or moving points"})
+        bookmarks.append({"frame": middle, "text": "most excluded wrong matches or moving points"})
     return sorted(bookmarks, key=lambda bookmark: int(bookmark["frame"]))

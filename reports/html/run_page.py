@@ -105,7 +105,7 @@ def render(
     table = Grid(tables.main_table(run, summary["estimators"]))
     added = [Note(f"{name}: {caption}.") for name, caption in run.added.items()]
     remarks = [*sequence["remarks"], *problem["remarks"]]
-    recording = {key: sequence[key] for key in ("name", "source", "form")}
+    recording = {"name": sequence["name"], "source": sequence["source"], "format": sequence["form"]}
     return render_page(
         Page(
             kind="report",

@@ -20,7 +20,7 @@ DEGREES_OF_FREEDOM = 6
 FIRST = 6
 """sentences of a verdict that stand above the table"""
 MEANING: Mapping[str, str] = {
-    "doubtful": "A small divergence from it counts, a large one may be its own error",
+    "doubtful": "A small divergence from it still shows agreement; a large one may be an error of the reference",
     "untrusted": "Divergence from it does not measure accuracy",
 }
 """consequence of a verdict other than `trusted`"""
@@ -51,7 +51,9 @@ def reference_sentence(name: str, trust: "Trust", *, is_compared: bool = True) -
 
 def causal_estimate(reference: str) -> str:
     """Description of the by-product of a smoother."""
-    return f"the causal estimate of {reference} (pose k from frames 0 to k)"
+    return (
+        f"the causal estimate of {reference} (pose k from frames 0 to k, before {reference}'s final Gauss-Newton steps)"
+    )
 
 
 def sample_requirement() -> str:
@@ -63,7 +65,7 @@ def threshold(bounds: Iterable[float]) -> str:
     """Thresholds on distances of one kind: 5 m, or 1 % of the path lengths where that is less."""
     every = sorted(bounds)
     if every[0] >= FAR:
-        return f"{every[0]:g} m (fixed above {FAR / FAR_SHARE:g} m of path length)"
+        return f"{every[0]:g} m ({limit_per_cent(FAR_SHARE)} of the path length, at most {FAR:g} m)"
     least, most = number(every[0]), number(every[-1])
     return f"{limit_per_cent(FAR_SHARE)} of the path length, {least if least == most else f'{least} to {most}'} m"
 

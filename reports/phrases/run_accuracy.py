@@ -165,9 +165,9 @@ def _closeness(run: Run, found: PairedRanking) -> list[str]:
         return []
     solved = f" Trusted means that {run.reference} solves this problem well, not that it is close to the truth."
     return [
-        f"The divergences (RMSE) of {listed(found.rmse)} are below {WITHIN_SIGMAS:g} times the position sigma of "
-        f"{run.reference}, {number(sigma)} m RMS: the ranking shows which is closer to {run.reference}, not "
-        f"which is closer to the truth.{solved if run.trust.verdict is Verdict.TRUSTED else ''}"
+        f"The divergences (RMSE) of {listed(found.rmse)} are below {number(WITHIN_SIGMAS * sigma)} m, "
+        f"{WITHIN_SIGMAS:g} times the RMS position sigma of {run.reference}: the ranking shows which is closer to "
+        f"{run.reference}, not which is closer to the truth.{solved if run.trust.verdict is Verdict.TRUSTED else ''}"
     ]
 
 

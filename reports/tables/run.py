@@ -25,7 +25,7 @@ NOT_POSITIVE_DEFINITE = (
     "in most frames P_ref exceeds 1.1 P in some direction, although the reference uses at least the same data (P: "
     "covariance of the estimator; P_ref: of the reference)"
 )
-NOT_DEFINED = "P − P_ref is not positive definite in the others"
+DEFINED = "P − P_ref is positive definite"
 Estimators = Mapping[str, Mapping[str, Any]]
 
 
@@ -192,7 +192,9 @@ def _left_out(estimator: Mapping[str, Any], metric: Metric) -> str:
         frames, left_out = (int(at(estimator, "nees_reference", key) or 0) for key in ("frames", "left_out"))
         if not left_out or metric.path[1] == "left_out":
             return ""
-        return f"over {number(frames)} of {counted(frames + left_out, 'frame')}: {NOT_DEFINED}"
+        those = f"{number(frames)} of {counted(frames + left_out, 'frame')}"
+        is_of_few = _is_of_few_frames(estimator, metric)
+        return f"{DEFINED} in only {those}" if is_of_few else f"over the {those} in which {DEFINED}"
     missing = at(estimator, metric.path[0], "missing") or 0
     return f"{counted(missing, 'error is', 'errors are')} missing (NaN) and left out" if missing else ""
 

@@ -27,7 +27,7 @@ REASONS: Mapping[str, str] = {
     "rows": "rows in the left and right image disagree",
     "prediction": "contradicts the motion of its track (wrong match)",
     "short": "remaining track too short to check",
-    "geometry": "point not determined, or behind a camera",
+    "geometry": "point cannot be triangulated, or is behind a camera",
     "moving": "point moved",
     "copied": "copied from the previous frame",
     "start": "the start was found with it",

@@ -12,6 +12,7 @@ from fgbaseline.data.finding import UNITS
 from fgbaseline.data.simulate import AXIS_CONVENTIONS, Simulation, simulate
 from fgbaseline.data.velocity_increments import dead_reckoned_path, increments
 from fgbaseline.diagnosis import Diagnosis, diagnose, findings_of, not_identifiable, repair, to_json
+from fgbaseline.diagnosis.findings.frame_spans import spans
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.diagnosis.window_adjustment.selection import spread_spans
 from fgbaseline.geometry import FloatArray
@@ -107,6 +108,12 @@ def test_a_wrong_speed_is_detected_and_not_repaired() -> None:
     assert finding.before == pytest.approx(1.06, abs=0.01)
     assert "the recording does not show which of the two is wrong" in finding.sentence
     assert np.array_equal(repair(d, MaskSettings()).sequence.linear_velocity, d.sequence.linear_velocity)
+
+
+def test_spans_of_frames_hold_no_frame_that_was_not_counted() -> None:
+    frames = np.array([3, 4, 6, 10, 11, 12, 20])
+    assert spans(frames) == "3 to 4, 6, 10 to 12, 20"
+    assert spans(frames, most=2) == "3 to 4, 10 to 12 and 2 more spans"
 
 
 def test_bursts_and_blackouts_and_gaps_are_dated() -> None:

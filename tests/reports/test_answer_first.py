@@ -84,7 +84,7 @@ def test_a_reference_nees_over_part_of_the_frames_says_so_and_causes_have_a_note
     for table in (main_table(run, estimators), evidence_table(run, estimators)):
         column = next(i for i, c in enumerate(table.columns) if "reference NEES" in f"{c.group} {c.title}")
         notes = {row.name: dict(table.notes).get(row.cells[column].note) for row in table.rows}
-        assert notes["ekf"] == f"over 40 of {T} frames: P − P_ref is not positive definite in the others"
+        assert notes["ekf"] == f"over the 40 of {T} frames in which P − P_ref is positive definite"
         assert notes["batch"] == "it solves the graph of the reference: P − P_ref is zero up to rounding"
         assert notes["isam2"] == "it is the reference"
     overconfident = run_with_claims("ekf")
@@ -117,7 +117,8 @@ def test_a_reference_nees_of_less_than_half_of_the_frames_is_no_value_of_the_tab
         column = next(i for i, c in enumerate(table.columns) if "reference NEES" in f"{c.group} {c.title}")
         cell = next(row.cells[column] for row in table.rows if row.name == "ekf")
         assert (cell.text != "–") == is_shown
-        assert dict(table.notes)[cell.note].startswith(f"over {defined} of {T} frames")
+        few, many = f"P − P_ref is positive definite in only {defined} of {T} frames", f"over the {defined} of {T} "
+        assert dict(table.notes)[cell.note].startswith(many if is_shown else few)
     hint = next(chart["hint"] for chart in page_data(run)["charts"] if chart["name"] == "nees-reference")
     assert f"no value in {T - defined} frames of ekf, where P − P_ref is not positive definite" in hint
 

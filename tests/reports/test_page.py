@@ -281,7 +281,7 @@ def test_the_moment_of_most_wrong_matches_is_the_one_of_the_sentence() -> None:
     excluded = np.where(frame < 20, Excluded.COPIED, excluded).astype(np.uint8)  # copies are no wrong matches
     run = run_of(replace(problem, excluded=excluded), answer(problem, "isam2"))
     (bookmark,) = page_data(run)["bookmarks"]
-    assert bookmark == {"frame": 35, "text": "most wrong matches or moving points"}
+    assert bookmark == {"frame": 35, "text": "most excluded wrong matches or moving points"}
     assert any("from 3 s to 4 s)." in sentence for sentence in verdict(run))
 
 
