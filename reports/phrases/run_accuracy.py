@@ -165,8 +165,8 @@ def _closeness(run: Run, found: PairedRanking) -> list[str]:
         return []
     solved = f" Trusted means that {run.reference} solves this problem well, not that it is close to the truth."
     return [
-        f"The divergences (RMSE) of {listed(found.rmse)} are below {number(WITHIN_SIGMAS * sigma)} m, "
-        f"{WITHIN_SIGMAS:g} times the RMS position sigma of {run.reference}: the ranking shows which is closer to "
+        f"The divergences (RMSE) of {listed(found.rmse)} are below {WITHIN_SIGMAS:g} times the RMS position "
+        f"sigma of {run.reference} ({WITHIN_SIGMAS:g} × {number(sigma)} m): the ranking shows which is closer to "
         f"{run.reference}, not which is closer to the truth.{solved if run.trust.verdict is Verdict.TRUSTED else ''}"
     ]
 

@@ -188,9 +188,9 @@ def test_an_order_within_the_sigma_of_the_reference_is_not_one_by_accuracy() -> 
         return [s for s in verdict(run) if "closer to isam2, not which is closer to the truth" in s]
 
     assert said(5.0) == [
-        "The divergences (RMSE) of dead-reckoning and ekf are below 26.0 m, 3 times the RMS position sigma of "
-        "isam2: the ranking shows which is closer to isam2, not which is closer to the truth. Trusted means that isam2 "
-        "solves this problem well, not that it is close to the truth."
+        "The divergences (RMSE) of dead-reckoning and ekf are below 3 times the RMS position sigma of isam2 "
+        "(3 × 8.66 m): the ranking shows which is closer to isam2, not which is closer to the truth. Trusted "
+        "means that isam2 solves this problem well, not that it is close to the truth."
     ]
     assert not said(0.1)
 
