@@ -1,6 +1,6 @@
 """TUM files are read and written: `timestamp tx ty tz qx qy qz qw` a line, s and m.
 
-`trajectory_reader` detects the format of any trajectory, TUM included, and has what all text formats share.
+`trajectory_opening` detects the format of any trajectory, TUM included; `trajectory_text_parser` parses all text formats.
 """
 
 import numpy as np
