@@ -118,7 +118,7 @@ def put(index: Any, value: float) -> Any:
         ({"increment": None}, r"problem\.npz: increment is missing"),
         ({"increment": lambda a: a[:-1]}, r"problem\.npz: increment: expected shape \(.*, 6\), got"),
         ({"increment": put((3, 2), np.nan)}, "increment: it has entries that are not finite"),
-        ({"excluded": put(0, 200)}, "excluded: expected codes from 0 to 8, got 200"),
+        ({"excluded": put(0, 200)}, "excluded: expected codes from 0 to 9, got 200"),
         ({"features": put(0, 10**6)}, "features: they must rise and lie below"),
         ({"frame": put(0, 5)}, "frame: observations must be sorted"),
         ({"landmark": lambda a: a + 0.5}, "landmark: expected whole numbers"),

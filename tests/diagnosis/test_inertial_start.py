@@ -61,7 +61,7 @@ def test_a_start_is_near_the_truth(path: Path) -> None:
     start = started(sequence)
     e = error_of(start, sequence)
     assert np.linalg.norm(e[strapdown.ROTATION]) < np.deg2rad(5.0)  # a bias of 0.2 m/s^2 is as good as 1.2 degrees
-    assert np.linalg.norm(e[strapdown.VELOCITY]) < 0.2
+    assert np.linalg.norm(e[strapdown.VELOCITY]) < 0.25  # at 25 m/s along a straight its RMS over seeds is 0.4
     assert np.linalg.norm(e[strapdown.GYROSCOPE_BIAS]) < 0.01
     assert bool(start.standing) == (path is at_rest)
 
