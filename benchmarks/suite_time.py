@@ -9,6 +9,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
@@ -24,13 +25,20 @@ WANTED = 0.6
 RECORDINGS = "FGBASELINE_RECORDINGS"
 
 
-def pytest(folder: Path, revision: str | None, *words: str | Path, **variables: str) -> str:
-    """What pytest prints for the tests of a revision, in its environment, with our plugin."""
+@cache
+def environment_of_tests(folder: Path, revision: str | None) -> tuple[Path, Path]:
+    """Sources of a revision, and the Python of its environment with the packages of its tests."""
     place = environment(folder, revision)
     source, python = place.parent / "source", place / "bin" / "python"
     group = f"{source / 'pyproject.toml'}:dev"
     uv = Path(sys.executable).with_name("uv")
     subprocess.run([uv, "pip", "install", "--quiet", "--python", python, "--group", group], check=True)
+    return source, python
+
+
+def pytest(folder: Path, revision: str | None, *words: str | Path, **variables: str) -> str:
+    """What pytest prints for the tests of a revision, in its environment, with our plugin."""
+    source, python = environment_of_tests(folder, revision)
     everything = os.environ | ONE_THREAD | {"PYTHONPATH": str(Path(__file__).parent)} | variables
     command = [python, "-m", "pytest", "-q", "-p", "cpu_time_plugin", *words]
     if '"full:' in (source / "pyproject.toml").read_text(encoding="utf-8"):  # an unknown marker is an error

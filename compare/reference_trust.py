@@ -193,7 +193,7 @@ def trust(
         ),
     ]
     in_batch = _compared_with_batch(problem, reference, batch, limit)
-    findings = [(criterion.verdict, text + _limit_of(criterion, text)) for criterion, text in judged if text]
+    findings = [(criterion.verdict, text + _limit_of(criterion)) for criterion, text in judged if text]
     if not problem.diagnosed:
         findings.append((Verdict.TRUSTED, "the recording was not diagnosed: its noise is assumed"))
     findings.append((in_batch.verdict, in_batch.reason))
@@ -206,9 +206,9 @@ def trust(
     )
 
 
-def _limit_of(criterion: Criterion, text: str) -> str:
-    """Limit that a share violates, in parentheses; empty if it violates none, or if `text` states the limit."""
-    if criterion.verdict is Verdict.TRUSTED or "limit" in text:
+def _limit_of(criterion: Criterion) -> str:
+    """Limit that a share violates, in parentheses; empty otherwise: texts of the residuals always state theirs."""
+    if criterion.verdict is Verdict.TRUSTED or criterion.unit != SHARE:
         return ""
     return f" (limit {limit_per_cent(criterion.doubtful)})"
 

@@ -147,8 +147,8 @@ class JointFilter:
         innovation = Innovation.of(linearized.H, linearized.residual, state.P)
         gated = self._gate(innovation.nis_per_observation(variance))
         mean, prior = np.zeros(state.size), state.xi.copy()
-        if self.depths is not None:
-            linearized, variance, mean = self._at_observed_depths(self.depths, linearized, variance, gated)
+        if self.depths is not None and (moved := self._at_observed_depths(self.depths, linearized, variance, gated)):
+            linearized, variance, mean = moved
             innovation = Innovation.of(linearized.H, linearized.residual, state.P)
         order = gated.order
         unordered, innovation = innovation, innovation.in_order(order)
@@ -219,24 +219,23 @@ class JointFilter:
         linearized: _LinearizedObservations,
         variance: FloatArray,
         gated: GatedObservations,
-    ) -> tuple[_LinearizedObservations, FloatArray, FloatArray]:
+    ) -> tuple[_LinearizedObservations, FloatArray, FloatArray] | None:
         """Move accepted landmarks of unknown depth to what the frame shows (`observed_depths`), and linearize there.
 
-        Returns the observations in the order given, their variances (n, r), px^2, and the mean (size,) of the prior's
-        error about the moved estimate. Residuals are at this mean: measured - predicted - H mean. Moved landmarks have
-        the second-order terms of their covariance after the observation.
+        None if there are none. Returns the observations in the order given, their variances (n, r), px^2, and the mean
+        (size,) of the prior's error about the moved estimate. Residuals are at this mean: measured - predicted - H mean.
+        Moved landmarks have the second-order terms of their covariance after the observation.
         """
         state, slot = self.state, linearized.H.slot
-        mean = np.zeros(state.size)
         unknown = gated.accepted & (depths.anchor[self.feature[linearized.observed]] != ABSENT)
         at = np.flatnonzero(unknown & (state.xi[slot, 2] > 0.0))
         if len(at) == 0:
-            return linearized, variance, mean
+            return None
         own = slot[at]
         charts, before, covariance = state.charts[own], state.xi[own], state.pose_and_landmark(own)
         measured, noise = self.measured[linearized.observed[at]], self.row_variance / gated.weight[at, None]
         shown = observed_depths(self.camera, self.cam_T_imu, state.body, charts, before, covariance, measured, noise)
-        move = np.zeros(state.size)
+        move, mean = np.zeros((2, state.size))
         move[state.n_body :].reshape(-1, 3)[own] = shown.xi - before
         self._apply_correction(move)
         state.scale_inverse_depths(own, shown.scale)

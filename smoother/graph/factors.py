@@ -10,7 +10,7 @@ import gtsam
 import numpy as np
 
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray, StereoCamera, se3
+from fgbaseline.geometry import FloatArray, HuberKernel, StereoCamera, se3
 
 from .frame_states import FrameStates
 from .gtsam_conversions import reorder_tangent
@@ -33,7 +33,7 @@ class FactorBuilder:
         self.imu_P_cam = gtsam.Pose3(problem.sequence.imu_T_cam)
         self._row_sigmas = np.sqrt(problem.measurement.row_variance)
         self._gaussian_noise = gtsam.noiseModel.Diagonal.Sigmas(self._row_sigmas)
-        self.pixel_noise = pixel_noise(problem)
+        self.pixel_noise = under_kernel(self._gaussian_noise, problem.kernel)
         self.steps = se3.exp(problem.increment)
         self.step_covariance = reorder_tangent(problem.increment_covariance)
         self.inertial = (
@@ -106,10 +106,9 @@ class FactorBuilder:
         return gtsam.PriorFactorPoint3(key, prior.mean[row], noise)
 
 
-def pixel_noise(problem: Problem) -> gtsam.noiseModel.Base:
+def under_kernel(gaussian: gtsam.noiseModel.Base, kernel: HuberKernel | None) -> gtsam.noiseModel.Base:
     """Noise model of the rows of an observation, under the problem's kernel."""
-    gaussian = gtsam.noiseModel.Diagonal.Sigmas(np.sqrt(problem.measurement.row_variance))
-    if problem.kernel is None:
+    if kernel is None:
         return gaussian
-    huber = gtsam.noiseModel.mEstimator.Huber.Create(problem.kernel.threshold)
+    huber = gtsam.noiseModel.mEstimator.Huber.Create(kernel.threshold)
     return gtsam.noiseModel.Robust.Create(huber, gaussian)
