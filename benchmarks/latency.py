@@ -26,7 +26,7 @@ from fgbaseline import data
 from . import docs_table
 from .claim_table import Row, table
 from .installed_revision import BEFORE, ROOT, NoHistoryError, environment
-from .metric_registry import drive
+from .metrics import drive
 
 PLACE = Path("docs/performance.md")
 SHORT, MIDDLE, LONG = 600, 3000, 100_000

@@ -223,8 +223,8 @@ class JointFilter:
         """Move accepted landmarks of unknown depth to what the frame shows (`observed_depths`), and linearize there.
 
         None if there are none. Returns the observations in the order given, their variances (n, r), px^2, and the mean
-        (size,) of the prior's error about the moved estimate. Residuals are at this mean: measured - predicted - H mean.
-        Moved landmarks have the second-order terms of their covariance after the observation.
+        (size,) of the prior's error about the moved estimate. Residuals are measured - predicted - H mean. Moved
+        landmarks have the second-order terms of their covariance after the observation.
         """
         state, slot = self.state, linearized.H.slot
         unknown = gated.accepted & (depths.anchor[self.feature[linearized.observed]] != ABSENT)

@@ -117,3 +117,11 @@ def test_no_name_is_also_that_of_a_module_beside_it(package: str) -> None:
     beside = {path.stem for place in module.__path__ for path in Path(place).iterdir()}
     attributes = {name: getattr(module, name) for name in module.__all__ if name in beside}
     assert all(type(found).__name__ == "module" for found in attributes.values()), attributes
+
+
+def test_every_benchmark_can_be_imported() -> None:
+    root = Path(__file__).parents[2]
+    modules = [f"benchmarks.{path.stem}" for path in sorted((root / "benchmarks").glob("*.py"))]
+    code = f"from importlib import import_module\nfor name in {modules!r}: import_module(name)"
+    result = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
