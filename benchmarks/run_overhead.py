@@ -50,7 +50,8 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
     with watch("imports"):
         from fgbaseline.data.parallel import background_map, cores
         from fgbaseline.reports import progress  # noqa: F401
-        from fgbaseline.reports.run.problem import RunSettings, build_problem, import_estimators, read_sequence
+        from fgbaseline.reports.run.problem import build_problem, read_sequence
+        from fgbaseline.reports.run.settings import RunSettings, import_estimators
     settings = RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):
         sequence = read_sequence(settings)

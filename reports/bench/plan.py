@@ -13,7 +13,7 @@ from fgbaseline.data.toml_file import Place, TomlFile, key_path
 from fgbaseline.diagnosis import read_repairs
 from fgbaseline.geometry import InputError
 
-from ..run.problem import check_estimators
+from ..run.settings import check_estimators
 from .job import File, Job, Planned, Recorded, Simulated, code_hash, file_hash
 from .suite import DriveError, Entry, Suite, drives, several
 

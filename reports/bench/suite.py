@@ -16,7 +16,7 @@ from fgbaseline.diagnosis.repair_overrides.settings import SigmaOverrides
 from fgbaseline.geometry import InputError
 
 from ..results.parts import Finite, Part
-from ..run.problem import RunSettings
+from ..run.settings import RunSettings
 
 Page: TypeAlias = Literal["none", "tables", "figures"]
 Preset: TypeAlias = Literal["calibrated", "documented"]

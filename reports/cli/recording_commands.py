@@ -106,7 +106,7 @@ def run(
     from fgbaseline.data.user_estimator import load_all
 
     from ..run.command import run as run_and_report
-    from ..run.problem import RunSettings
+    from ..run.settings import RunSettings
 
     functions = load_all(user_estimators)
     names = DEFAULT_ESTIMATORS if estimators is None else names_in(estimators)
@@ -197,7 +197,8 @@ def diagnose(
     from fgbaseline.data import TimeUnit
 
     from ..run.diagnose import print_diagnosis
-    from ..run.problem import RunSettings, read_sequence
+    from ..run.problem import read_sequence
+    from ..run.settings import RunSettings
 
     unit = None if time_unit is None else TimeUnit(time_unit)
     chosen = RunSettings(sequence=sequence, time_unit=unit, topics=names_in(topics), tracker=settings, **given)
@@ -228,7 +229,7 @@ def export(out: Path, force: bool, topics: str | None, settings: Path | None, **
     Exits 0, or 2 on bad input.
     """
     from ..run.command import export as export_problem
-    from ..run.problem import RunSettings
+    from ..run.settings import RunSettings
 
     chosen = RunSettings(topics=names_in(topics), tracker=settings, **given)
     return export_problem(chosen, out, force=force)

@@ -14,7 +14,8 @@ from fgbaseline.geometry import InputError
 
 from ..results.json_files import SUMMARY
 from ..results.reader import RunFolder
-from ..run.problem import RunSettings, build_problem, hold_out_tracks
+from ..run.problem import build_problem, hold_out_tracks
+from ..run.settings import RunSettings
 
 NO_REFERENCE = "the run has no reference: none of its estimators succeeded; repeat the run"
 

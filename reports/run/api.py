@@ -1,12 +1,15 @@
-"""`fgbaseline.run`: the command `run` for Python, with arrays and functions where it has files and names."""
+"""`fgbaseline.run`, the command `run` for Python, with arrays and functions in place of files and names; its result."""
 
 import os
-import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
+from functools import cached_property
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal
 
+import pandas as pd
+
+from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.compare.trajectory_comparison.conventions import Source
 from fgbaseline.data import (
     LandmarkMode,
@@ -15,32 +18,94 @@ from fgbaseline.data import (
     TimeUnit,
     Trajectory,
     Truth,
-    estimator_names,
-    find_estimator,
 )
+from fgbaseline.data.dataframes import as_cell_value
 from fgbaseline.data.estimator_runner import no_progress
 from fgbaseline.data.formats.file_errors import FilePath
-from fgbaseline.data.user_estimator import load_all
-from fgbaseline.geometry import InputError
 
 from ..comparison.opening import as_path
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
+from ..notebook import NotebookResult, write_report
+from ..phrases.run import verdict
 from ..python_arguments import for_python
+from ..results.json_files import SUMMARY
+from ..results.run import Summary, summarize
+from ..tables.run import main_frame, main_table, metrics_table
+from ..tables.table import Table
 from .defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
 from .estimation import read_added, solve
-from .problem import (
-    RunSettings,
-    build_problem,
-    check_estimators,
-    hold_out_tracks,
-    import_estimators,
-    read_sequence,
-    with_defaults,
-)
-from .report import RunReport
+from .problem import build_problem, hold_out_tracks, read_sequence
+from .settings import RunSettings, Solver, check_estimators, import_estimators, named_estimators, with_defaults
 
-Solver: TypeAlias = Callable[..., object]
-"""`solve(problem, progress=None) -> Estimate`; another return value becomes a row that failed, with the reason"""
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class RunReport(NotebookResult, Run):
+    """A run with pandas tables, sentences, matplotlib figures, and the folder of `fgbaseline run`."""
+
+    @cached_property
+    def summary(self) -> Summary:
+        """All metrics, as in `summary.json`."""
+        return summarize(self)
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """One row per main metric, one column per estimator."""
+        return main_frame(self, self.summary.content["estimators"])
+
+    @property
+    def text_table(self) -> Table:
+        """The main metrics as text, for `tables.markdown`, `latex` and `print_table`."""
+        return main_table(self, self.summary.content["estimators"]).transposed()
+
+    @property
+    def metrics(self) -> pd.DataFrame:
+        """Every metric: estimator, metric (its path in `summary.json`) and value."""
+        return metrics_table(self.summary)
+
+    @cached_property
+    def verdict(self) -> list[str]:
+        """Conclusions in sentences, the trust in the reference first."""
+        return verdict(self)
+
+    @property
+    def heading(self) -> str:
+        """Recording, and reference with its trust."""
+        reference = "no reference" if self.reference is None else f"reference {self.reference}"
+        return f"Run on {self.problem.sequence.name}: {reference}, {self.trust.verdict.name.lower()}"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table, as `table`."""
+        return self.table
+
+    def figures(self) -> "dict[str, Figure]":
+        """The figures by name, as the page has them."""
+        from ..figures import draw
+
+        return {name: as_cell_value(figure) for name, figure in draw(self).items()}
+
+    def plot(self) -> "Figure":
+        """The figure of all paths, from above."""
+        return self.figures()["paths_overlaid"]
+
+    @for_python
+    def report(self, path: str | os.PathLike[str], *, force: bool = False, processes: int = 1) -> Path:
+        """Writes the page alone to `NAME.html`, or the folder of `fgbaseline run`; returns the path of the page.
+
+        `force` replaces an earlier file or folder; `processes` draw the folder's figures. Raises InputError where
+        the path exists without `force`, or is a folder that is not that of a run.
+        """
+        from ..html.run_page import render
+        from .folder import write_run
+
+        return write_report(
+            path,
+            lambda: render(self, self.summary.content, self.figures()),
+            lambda folder: write_run(self, folder, processes),
+            force=force,
+            mark=SUMMARY,
+        )
 
 
 @for_python
@@ -165,50 +230,6 @@ def run(
         watch = reporter().estimator
     solved = solve(problem, chosen, watch, held, processes, added)
     return RunReport(**{field.name: getattr(solved, field.name) for field in fields(solved)})
-
-
-def named_estimators(
-    given: str | Solver | Iterable[str | Solver] | Mapping[str, str | Solver],
-) -> tuple[tuple[str, ...], dict[str, Solver]]:
-    """Names of all estimators in order, and the unregistered functions by name.
-
-    Raises InputError for what is neither name nor function, for a function without a name, and for the name of another
-    registered estimator.
-    """
-    if isinstance(given, Mapping):
-        each = list(given.items())
-    elif not (callable(given) or isinstance(given, Iterable)):
-        raise InputError(f"estimators: expected names and functions, got {type(given).__name__}")
-    else:
-        each = [("", one) for one in ([given] if isinstance(given, str) or callable(given) else given)]
-    names: list[str] = []
-    functions: dict[str, Solver] = {}
-    for wanted, one in each:
-        if isinstance(one, str) and ":" not in one and wanted in ("", one):
-            names += names_in(one)
-            continue
-        if isinstance(one, str):
-            ((name, function),) = load_all((f"{wanted}={one}" if wanted else one,)).items()
-        elif callable(one):
-            name, function = wanted or _name_of(one), one
-        else:
-            raise InputError(f"estimators: expected names and functions, got {type(one).__name__}")
-        names.append(name)
-        if name not in estimator_names():
-            functions[name] = function
-        elif find_estimator(name) is not function:
-            raise InputError(f"estimators: '{name}' is installed already; name the function, such as {{'mine': solve}}")
-    return tuple(names), functions
-
-
-def _name_of(function: Solver) -> str:
-    """Registered name of a function, else its own."""
-    name = str(getattr(function, "__name__", ""))
-    if (registered := name.replace("_", "-")) in estimator_names() and find_estimator(registered) is function:
-        return registered
-    if not re.fullmatch(r"\w+", name):
-        raise InputError(f"estimators: {function!r} has no name; give it one, such as {{'mine': solve}}")
-    return name
 
 
 def _truth_source(

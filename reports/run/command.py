@@ -13,17 +13,8 @@ from fgbaseline.data.wording import plural
 
 from ..open_page import announce, print_sentences
 from ..results.json_files import SUMMARY
-from .problem import (
-    TRACKS,
-    RunSettings,
-    build_problem,
-    check_estimators,
-    hold_out_tracks,
-    import_estimators,
-    preliminary_remarks,
-    read_sequence,
-    with_defaults,
-)
+from .problem import TRACKS, build_problem, hold_out_tracks, preliminary_remarks, read_sequence
+from .settings import RunSettings, check_estimators, import_estimators, with_defaults
 
 FAILED = 1
 UNWRAPPED = 120

@@ -19,7 +19,8 @@ from fgbaseline.geometry import StereoCamera
 from fgbaseline.geometry.linearization import Prediction
 from fgbaseline.reports.results.json_files import SUMMARY
 from fgbaseline.reports.results.run import summarize
-from fgbaseline.reports.run.problem import RunSettings, build_problem
+from fgbaseline.reports.run.problem import build_problem
+from fgbaseline.reports.run.settings import RunSettings
 
 from ..builders.commands import fgbaseline
 from ..builders.summaries import check_files

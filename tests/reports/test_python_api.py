@@ -24,9 +24,8 @@ from fgbaseline.geometry import InputError, se3
 from fgbaseline.reports.cli.main import COMMANDS
 from fgbaseline.reports.comparison import ComparisonReport
 from fgbaseline.reports.python_arguments import in_python
-from fgbaseline.reports.run.api import named_estimators
+from fgbaseline.reports.run.api import RunReport, named_estimators
 from fgbaseline.reports.run.defaults import DEFAULT_ESTIMATORS
-from fgbaseline.reports.run.report import RunReport
 
 from ..builders.commands import everything_in
 from ..builders.commands import fgbaseline as command

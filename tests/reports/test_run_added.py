@@ -15,7 +15,8 @@ from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.run.estimation import read_added, solve
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import RunSettings, build_problem
+from fgbaseline.reports.run.problem import build_problem
+from fgbaseline.reports.run.settings import RunSettings
 
 from ..builders.browser import Opened
 

@@ -20,7 +20,8 @@ from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.evidence import frame_ranges
 from fgbaseline.reports.run.estimation import solve
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import RunSettings, hold_out_tracks
+from fgbaseline.reports.run.problem import hold_out_tracks
+from fgbaseline.reports.run.settings import RunSettings
 
 from ..builders.commands import fgbaseline
 from ..builders.empty_figures import figures_left_empty
