@@ -10,7 +10,8 @@ from fgbaseline.data.formats.atomic_folder import atomic_folder
 from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.formats.file_errors import FilePath
 
-from .tables.table import Table, html
+from .tables.table import Table
+from .tables.writers import html
 
 
 class _Result(Protocol):

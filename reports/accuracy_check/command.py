@@ -28,8 +28,8 @@ from ..phrases.check import bound, remarks, verdict
 from ..results.check import Checked, Line
 from ..results.reader import Measured, read_measured
 from ..tables.check import cells, check_table, unit_of
-from ..tables.table import UNWRAPPED, print_table
-from ..tables.table import markdown as markdown_table
+from ..tables.writers import UNWRAPPED, print_table
+from ..tables.writers import markdown as markdown_table
 from .baseline import refusal, require_replaceable, write_baseline
 from .evaluation import evaluate
 from .limits_file import Limits

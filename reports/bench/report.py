@@ -22,7 +22,7 @@ from ..results.bench import ANSWERED, BENCH_METRICS, COSTS, OF_THE_RUN, Results
 from ..results.json_files import INFINITE, at
 from ..results.reader import RunFolder
 from ..tables.bench import main_table, ranking_tables, runs_table
-from ..tables.table import latex, markdown
+from ..tables.writers import latex, markdown
 from .job import Planned
 from .progress import duration
 from .run_cache import RUNS, RunCache

@@ -136,7 +136,7 @@ def compare(
     report = compare_files(reference, *estimates, landmarks=landmarks, deltas=deltas, drawn=out is not None, **options)
     from ..open_page import announce, print_sentences
     from ..phrases.evidence import FIRST
-    from ..tables.table import print_table
+    from ..tables.writers import print_table
 
     page = None if out is None else report.report(out, force=force)
     first, *others = report.verdict

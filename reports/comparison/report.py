@@ -24,8 +24,8 @@ from ..python_arguments import for_python
 from ..results.comparison_summary import results_by_name, summarize
 from ..results.json_files import COMPARISON
 from ..tables.comparison import comparison_table, main_columns, main_frame, metrics_columns
-from ..tables.csv_file import write_csv
-from ..tables.table import Table, latex, markdown
+from ..tables.table import Table
+from ..tables.writers import latex, markdown, write_csv
 from .inputs import Given, GivenLandmarks, read_entries
 
 if TYPE_CHECKING:

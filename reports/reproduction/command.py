@@ -18,7 +18,7 @@ from fgbaseline.geometry import InputError
 from ..figures import save
 from ..figures.reproduction import draw
 from ..progress import reporter
-from ..tables.table import print_table
+from ..tables.writers import print_table
 from .claims import Claim, claims_of, missing_claims
 from .experiments import Study, SweepSettings, stages_of, study_recording
 from .page import claims_table, render

@@ -61,7 +61,7 @@ def run(
         from ..phrases.evidence import FIRST
         from ..phrases.run import verdict
         from ..tables.run import terminal_table
-        from ..tables.table import print_table
+        from ..tables.writers import print_table
         from .estimation import solve
         from .folder import write_run
 

@@ -87,7 +87,7 @@ def _print(found: Found) -> None:
     click.echo(f"{found.sequence.name}: {found.counts}")
     if found.findings:
         from ..tables.run_details import terminal_findings
-        from ..tables.table import print_table
+        from ..tables.writers import print_table
 
         print_table(terminal_findings(found.findings), width=UNWRAPPED, spaced=True)
     if found.undecided or not found.findings:

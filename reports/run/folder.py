@@ -21,9 +21,8 @@ from ..html.run_page import render
 from ..results.json_files import SUMMARY
 from ..results.reader import TRUTH
 from ..results.run import Summary, summarize
-from ..tables.csv_file import write_csv
 from ..tables.run import main_table, main_values, metrics_table
-from ..tables.table import latex, markdown
+from ..tables.writers import latex, markdown, write_csv
 
 
 def write_run(run: Run, folder: Path, processes: int = 1, pictures: Pictures | None = None) -> Summary:

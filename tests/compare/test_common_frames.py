@@ -21,7 +21,7 @@ from fgbaseline.reports.phrases.position_errors import significance_sentences
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.bench import BENCH_METRICS
 from fgbaseline.reports.tables.run import main_table
-from fgbaseline.reports.tables.table import latex, markdown
+from fgbaseline.reports.tables.writers import latex, markdown
 
 from ..builders.runs import answer, as_dict, run_of, scene
 from ..builders.synthetic import plain_problem

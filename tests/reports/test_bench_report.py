@@ -28,7 +28,7 @@ from fgbaseline.reports.phrases.bench import sentences
 from fgbaseline.reports.results import bench as tables
 from fgbaseline.reports.results.bench import Results
 from fgbaseline.reports.tables.bench import main_table
-from fgbaseline.reports.tables.table import latex, markdown
+from fgbaseline.reports.tables.writers import latex, markdown
 
 from ..builders.benches import written
 from ..builders.commands import fgbaseline

@@ -19,7 +19,7 @@ from fgbaseline.data.problem_export import write_problem
 from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.results.comparison import Summary
-from fgbaseline.reports.tables.table import latex, markdown
+from fgbaseline.reports.tables.writers import latex, markdown
 
 from ..builders.refusals import refused
 from ..builders.synthetic import drive, matched

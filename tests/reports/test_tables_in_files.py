@@ -7,7 +7,8 @@ import pandas as pd
 
 from fgbaseline.reports.run.folder import write_numbers
 from fgbaseline.reports.tables.run_details import trust_table
-from fgbaseline.reports.tables.table import Cell, Column, Row, Table, latex, markdown
+from fgbaseline.reports.tables.table import Cell, Column, Row, Table
+from fgbaseline.reports.tables.writers import latex, markdown
 
 from ..builders.runs import standard_run
 

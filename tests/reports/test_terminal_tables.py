@@ -9,7 +9,8 @@ import pytest
 import rich.console
 
 from fgbaseline.reports.open_page import print_sentences
-from fgbaseline.reports.tables.table import Cell, Column, Row, Table, print_table
+from fgbaseline.reports.tables.table import Cell, Column, Row, Table
+from fgbaseline.reports.tables.writers import print_table
 
 HEADINGS = ("ATE RMSE", "divergence RMSE", "median reprojection", "claimed sigma", "reference NEES", "time")
 TEXTS = ("0.523 [0.412, 0.663]", "22.8", "1.03", "0.0536", "overconfident", "3.82")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fgbaseline.reports.tables.csv_file import EXACT, write_csv
+from fgbaseline.reports.tables.writers import EXACT, write_csv
 
 NAMES = st.text(st.characters(codec="utf-8", exclude_categories=("Cs", "Cc")), min_size=1, max_size=6)
 CELLS = st.tuples(st.text('ab," é', min_size=1), st.floats(), st.integers(-(2**60), 2**60), st.booleans())
