@@ -12,7 +12,7 @@ from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
 from fgbaseline.data.formats.file_errors import FilePath
 from fgbaseline.geometry import InputError
 
-from ..python_arguments import for_python
+from ..python_interface import for_python
 from .opening import as_path, with_open_file
 
 if TYPE_CHECKING:

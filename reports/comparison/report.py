@@ -18,9 +18,8 @@ from fgbaseline.data import write_tum
 from fgbaseline.data.dataframes import as_cell_value
 from fgbaseline.data.formats.file_errors import FilePath
 
-from ..notebook import NotebookResult, write_report
 from ..phrases import comparison as phrases
-from ..python_arguments import for_python
+from ..python_interface import NotebookResult, for_python, write_report
 from ..results.comparison_summary import results_by_name, summarize
 from ..results.json_files import COMPARISON
 from ..tables.comparison import comparison_table, main_columns, main_frame, metrics_columns

@@ -25,9 +25,8 @@ from fgbaseline.data.formats.file_errors import FilePath
 
 from ..comparison.opening import as_path
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
-from ..notebook import NotebookResult, write_report
 from ..phrases.run import verdict
-from ..python_arguments import for_python
+from ..python_interface import NotebookResult, for_python, write_report
 from ..results.json_files import SUMMARY
 from ..results.run import Summary, summarize
 from ..tables.run import main_frame, main_table, metrics_table

@@ -23,7 +23,7 @@ from fgbaseline.data.problem_export import write_problem
 from fgbaseline.geometry import InputError, se3
 from fgbaseline.reports.cli.main import COMMANDS
 from fgbaseline.reports.comparison import ComparisonReport
-from fgbaseline.reports.python_arguments import in_python
+from fgbaseline.reports.python_interface import in_python
 from fgbaseline.reports.run.api import RunReport, named_estimators
 from fgbaseline.reports.run.defaults import DEFAULT_ESTIMATORS
 
