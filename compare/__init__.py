@@ -3,6 +3,8 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from fgbaseline.geometry.path_length import distance_traveled
+
     from .consistency.anees import AneesSummary, anees, anees_summary, average_nees
     from .consistency.covariance import (
         CovarianceState,
@@ -11,7 +13,7 @@ if TYPE_CHECKING:
         covariance_state,
         scaled_covariance,
     )
-    from .consistency.nees import body_error, nees, nees_table, sigma_ratio
+    from .consistency.nees import body_error, nees, nees_summary, nees_table, sigma_ratio
     from .consistency.nis import NisSummary, nis_per_degree, nis_summary
     from .consistency.pose_sigma import PoseSigma, pose_sigma
     from .consistency.reference_nees import ReferenceNees, reference_nees
@@ -90,7 +92,6 @@ if TYPE_CHECKING:
         travel_direction_misfit,
         world_rotation_from_positions,
     )
-    from .trajectory.path_length import distance_traveled
     from .trajectory.segments import SegmentErrors, segment_errors
     from .trajectory.time_offset import TimeOffset, time_offset
 else:
@@ -102,7 +103,7 @@ else:
             "consistency.anees": "AneesSummary anees anees_summary average_nees",
             "consistency.covariance": "CovarianceState covariance_of_body covariance_since_first covariance_state "
             "scaled_covariance",
-            "consistency.nees": "body_error nees nees_table sigma_ratio",
+            "consistency.nees": "body_error nees nees_summary nees_table sigma_ratio",
             "consistency.nis": "NisSummary nis_per_degree nis_summary",
             "consistency.pose_sigma": "PoseSigma pose_sigma",
             "consistency.reference_nees": "ReferenceNees reference_nees",
@@ -135,7 +136,7 @@ else:
             "trajectory.frame_conventions": "BodyRotation body_rotation has_conjugated_orientations "
             "least_rotation_misfit length_unit rmse_of_inverse_poses travel_direction_misfit "
             "world_rotation_from_positions",
-            "trajectory.path_length": "distance_traveled",
+            "fgbaseline.geometry.path_length": "distance_traveled",
             "trajectory.segments": "SegmentErrors segment_errors",
             "trajectory.time_offset": "TimeOffset time_offset",
             "reference_trust": "Criterion Trust Verdict trust",
@@ -213,6 +214,7 @@ __all__ = [
     "mean_interval",
     "monte_carlo_ranking",
     "nees",
+    "nees_summary",
     "nees_table",
     "nis_per_degree",
     "nis_summary",

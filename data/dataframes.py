@@ -38,12 +38,6 @@ def table(columns: Mapping[str, object], index: str) -> "pd.DataFrame":
     return frame
 
 
-def path_length(positions: FloatArray) -> float:
-    """Length of the line through positions (n, 3), m; those that are not finite are left out."""
-    known = positions[np.isfinite(positions).all(axis=1)]
-    return float(np.linalg.norm(np.diff(known, axis=0), axis=1).sum())
-
-
 def plot_path(positions: FloatArray, label: str, axes: "Axes | None") -> "Axes":
     """Draws positions (n, 3), m, in the plane of the two world axes along which they extend farthest.
 

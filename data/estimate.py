@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, se3, strapdown
+from fgbaseline.geometry.path_length import path_length
 
-from .dataframes import axis_columns, path_length, plot_path, pose_columns, table
+from .dataframes import axis_columns, plot_path, pose_columns, table
 from .display import Displayed
 from .observations import BoolArray, IntArray
 from .wording import plural

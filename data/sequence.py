@@ -8,8 +8,9 @@ import numpy as np
 
 from fgbaseline.geometry import Camera, FloatArray, InputError, MonocularCamera, StereoCamera, se3, so3
 from fgbaseline.geometry.monocular_camera import require_stereo
+from fgbaseline.geometry.path_length import path_length
 
-from .dataframes import axis_columns, path_length, plot_over_time, pose_columns, table
+from .dataframes import axis_columns, plot_over_time, pose_columns, table
 from .display import Displayed
 from .finding import Finding
 from .imu import ImuSamples

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, so3
+from fgbaseline.geometry.path_length import path_length
 
-from .dataframes import path_length, plot_path, pose_columns, table
+from .dataframes import plot_path, pose_columns, table
 from .display import Displayed
 from .observations import BoolArray, IntArray
 

@@ -11,7 +11,7 @@ import pandas as pd
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3
 
-from ..statistics.chi_square import mahalanobis_squared
+from ..statistics.chi_square import mahalanobis_squared, share_inside_bounds
 from .covariance import CovarianceState, covariance_state
 
 PARTS = {"position": slice(0, 3), "rotation": slice(3, 6)}
@@ -51,6 +51,20 @@ def nees_table(estimate: Estimate, truth: Truth) -> pd.DataFrame:
     for name, part in PARTS.items():
         table.loc[k, name] = mahalanobis_squared(error[:, part], P[:, part, part])
     return table
+
+
+def nees_summary(values: FloatArray, degrees: float = 6.0) -> dict[str, float | int]:
+    """Mean, median, share `inside_95` the bounds of a single value and number of `frames` of a NEES (T,) without NaN.
+
+    The statistics are NaN where every frame is. `degrees`: expected mean, the degrees of freedom of the error.
+    """
+    known = values[~np.isnan(values)]
+    return {
+        "mean": float(np.mean(known)) if len(known) else np.nan,
+        "median": float(np.median(known)) if len(known) else np.nan,
+        "inside_95": share_inside_bounds(known, degrees),
+        "frames": len(known),
+    }
 
 
 def sigma_ratio(estimate: Estimate, reference: Estimate) -> pd.DataFrame:

@@ -11,11 +11,11 @@ import numpy as np
 
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError, so3
+from fgbaseline.geometry.path_length import distance_traveled
 
 from ..column_tables import Columns, to_frame
 from .association import MatchedTrajectories
 from .delta_pairs import TOLERANCE, Unit, pose_pairs
-from .path_length import distance_traveled
 
 if TYPE_CHECKING:
     import pandas as pd

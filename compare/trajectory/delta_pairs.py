@@ -6,8 +6,7 @@ import numpy as np
 
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError, so3
-
-from .path_length import distance_traveled
+from fgbaseline.geometry.path_length import distance_traveled
 
 ROUNDING = 1e-9
 """tolerance as a share of a delta, for steps whose sum equals the delta up to rounding"""

@@ -8,12 +8,13 @@ from numpy.typing import ArrayLike
 
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FgbaselineError, FloatArray, InputError, so3
+from fgbaseline.geometry.path_length import distance_traveled
 
 from ..column_tables import Columns, to_frame
 from ..statistics.descriptive import summarized
 from .alignment import Align, Alignment, align, align_se3
+from .along_track_frame import along_track_frame
 from .association import MatchedTrajectories
-from .path_length import along_track_frame, distance_traveled
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,13 +7,13 @@ import numpy as np
 
 from fgbaseline.data.observations import IntArray
 from fgbaseline.geometry import FloatArray, InputError
+from fgbaseline.geometry.path_length import distance_traveled
 
 from ..statistics.block_bootstrap import REPETITIONS, bootstrapped
 from ..statistics.bootstrap_resampling import CONFIDENCE
 from .association import MatchedTrajectories
 from .ate_rpe import PoseRelation, relative_pose_error, require_stamps
 from .delta_pairs import nearest_delta_pairs
-from .path_length import distance_traveled
 
 if TYPE_CHECKING:
     import pandas as pd

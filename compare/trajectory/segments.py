@@ -10,12 +10,12 @@ from fgbaseline.data.display import Displayed
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray, InputError
+from fgbaseline.geometry.path_length import distance_traveled
 
 from ..column_tables import Columns, to_frame
 from ..statistics.block_bootstrap import Bounded, bootstrapped
 from .association import MatchedTrajectories
 from .ate_rpe import PoseRelation, relative_pose_error
-from .path_length import distance_traveled
 
 if TYPE_CHECKING:
     import pandas as pd

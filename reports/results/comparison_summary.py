@@ -1,18 +1,16 @@
 """Values of a comparison as `comparison.json` and `metrics.csv` hold them."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from fgbaseline import compare
-from fgbaseline.compare import SegmentErrors, distance_traveled
+from fgbaseline.compare import SegmentErrors
 from fgbaseline.compare.column_tables import Columns
 from fgbaseline.compare.statistics.block_bootstrap import Bounded, ErrorStatistics
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.sample_sizes import coverage, samples
+from fgbaseline.geometry.path_length import path_length
 
 from .json_files import INFINITE, finite, nulls
 
@@ -61,7 +59,7 @@ def _reference(comparison: Comparison) -> dict[str, Any]:
         "source": path.source,
         "poses": len(path),
         "duration_s": float(path.t[-1] - path.t[0]) if path.stamped else None,
-        "path_m": float(distance_traveled(path.position)[-1]),
+        "path_m": path_length(path.position),
         "trust": None if trust is None else trust.verdict.name.lower(),
         "reasons": [] if trust is None else list(trust.reasons),
         "remarks": list(comparison.reference.remarks),
@@ -169,14 +167,9 @@ def _map(table: "pd.DataFrame") -> dict[str, Any]:
 
 
 def _nees(reported: "ReportedCovariance") -> dict[str, float | int]:
-    known = reported.nees[~np.isnan(reported.nees)]
-    mean, median = (float(np.mean(known)), float(np.median(known))) if len(known) else (math.nan, math.nan)
-    return {
-        "mean": mean,
-        "median": median,
-        "frames": len(known),
-        "not_positive_definite": reported.not_positive_definite,
-    }
+    summary = compare.nees_summary(reported.nees)
+    kept = {name: summary[name] for name in ("mean", "median", "frames")}
+    return {**kept, "not_positive_definite": reported.not_positive_definite}
 
 
 def _held_out(comparison: Comparison, name: str) -> dict[str, Any] | None:

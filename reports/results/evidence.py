@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from fgbaseline import compare
-from fgbaseline.compare import CovarianceState, share_inside_bounds
+from fgbaseline.compare import CovarianceState
 from fgbaseline.compare.estimate_comparison import Evidence, Result, Run
-from fgbaseline.geometry import FloatArray
 
 from .parts import Nees, Number, Part, PoseSigma
 
@@ -175,13 +174,13 @@ def evidence_notes(run: Run, result: Result) -> dict[str, str]:
 
 
 def _nees(table: pd.DataFrame) -> dict[str, float | int]:
-    position, rotation = (statistics_of(table[part].to_numpy())["mean"] for part in ("position", "rotation"))
-    return {**statistics_of(table["pose"].to_numpy()), "position_mean": position, "rotation_mean": rotation}
+    position, rotation = (compare.nees_summary(table[part].to_numpy())["mean"] for part in ("position", "rotation"))
+    return {**compare.nees_summary(table["pose"].to_numpy()), "position_mean": position, "rotation_mean": rotation}
 
 
 def _difference(difference: compare.ReferenceNees) -> dict[str, float | int]:
     return {
-        **statistics_of(difference.nees),
+        **compare.nees_summary(difference.nees),
         "left_out": int(difference.left_out.sum()),
         "overconfident": int(difference.overconfident.sum()),
     }
@@ -191,17 +190,6 @@ def summarize_sigma(sigma: compare.PoseSigma) -> dict[str, float] | None:
     """Values of the model `PoseSigma`; None without a valid covariance."""
     values = {name: float(getattr(sigma, name)) for name in PoseSigma.model_fields}
     return values if math.isfinite(sigma.position_rmse) else None
-
-
-def statistics_of(nees: FloatArray, degrees: float = 6.0) -> dict[str, float | int]:
-    """Mean, median, share inside the 95 % bounds and number of the frames of a NEES (T,) with so many degrees."""
-    known = nees[~np.isnan(nees)]
-    return {
-        "mean": float(np.mean(known)) if len(known) else math.nan,
-        "median": float(np.median(known)) if len(known) else math.nan,
-        "inside_95": share_inside_bounds(known, degrees),
-        "frames": len(known),
-    }
 
 
 def _covariance(evidence: Evidence) -> dict[str, int | str]:

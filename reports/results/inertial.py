@@ -11,7 +11,7 @@ from fgbaseline.compare.consistency.state_nees import QUANTITIES
 from fgbaseline.compare.estimate_comparison import InertialEvidence, Result, Run
 from fgbaseline.geometry.strapdown import BLOCKS
 
-from .evidence import REFERENCE, statistics_of
+from .evidence import REFERENCE
 from .parts import Number, Part, Spread
 
 
@@ -96,5 +96,5 @@ def _nees(table: pd.DataFrame | None) -> Mapping[str, Any] | None:
     if table is None or table.isna().all(axis=None):
         return None
     degrees = {"state": 15.0, **dict.fromkeys(BLOCKS, 3.0)}
-    each = {name: statistics_of(table[name].to_numpy(), dof) for name, dof in degrees.items()}
+    each = {name: compare.nees_summary(table[name].to_numpy(), dof) for name, dof in degrees.items()}
     return {**each.pop("state"), **each}

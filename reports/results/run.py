@@ -8,9 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from fgbaseline.compare.estimate_comparison import Run
-from fgbaseline.data import Excluded, Problem
+from fgbaseline.data import Estimate, Excluded, Problem, Truth
 from fgbaseline.data.top_view import TopView
-from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.path_length import path_length
 
 from .estimator import EstimatorSummary, InertialEstimatorSummary, summarize_estimator
 from .evidence import summarize_sigma
@@ -177,10 +177,10 @@ def summarize(run: Run) -> Summary:
 
 def _path_length(run: Run) -> float:
     """Length of the true path, else of the reference's, over the frames that have one, m."""
-    truth = run.problem.sequence.truth
-    if truth is not None:
-        return _length(truth.world_T_imu)
-    return math.nan if run.reference is None else _length(run.results[run.reference].estimate.world_T_imu)
+    path: Truth | Estimate | None = run.problem.sequence.truth
+    if path is None and run.reference is not None:
+        path = run.results[run.reference].estimate
+    return math.nan if path is None else path_length(path.world_T_imu[:, :3, 3])
 
 
 def _excluded_counts(problem: Problem) -> dict[str, int]:
@@ -208,11 +208,6 @@ def _held_out(run: Run) -> dict[str, Any] | None:
         "gate_px": 0.0 if errors is None else errors.gate,
         "judged": 0 if errors is None else len(errors.table),
     }
-
-
-def _length(poses: FloatArray) -> float:
-    positions = poses[np.isfinite(poses).all(axis=(1, 2)), :3, 3]
-    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline import compare, ekf
-from fgbaseline.compare.trajectory.path_length import along_track_frame, distance_traveled
+from fgbaseline.compare.trajectory.along_track_frame import along_track_frame
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3, so3
 
@@ -324,11 +324,6 @@ def test_the_divergence_summary_of_a_known_case() -> None:
         }
     )
     assert compare.pose_errors(estimate, reference, Z_UP)["heading_deg"].tolist() == pytest.approx([0.0, 3.0, -4.0])
-
-
-def test_steps_to_and_from_an_unknown_position_count_as_zero() -> None:
-    positions = np.array([[0.0, 0, 0], [np.nan, 0, 0], [2.0, 0, 0], [2.0, 3.0, 4.0]])
-    assert distance_traveled(positions).tolist() == [0.0, 0.0, 0.0, 5.0]
 
 
 def test_a_step_below_a_tenth_of_the_brisk_ones_has_no_direction_of_its_own() -> None:

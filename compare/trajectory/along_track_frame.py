@@ -1,4 +1,4 @@
-"""Length of a path, and its along-track frame."""
+"""Along-track frame of a path."""
 
 import numpy as np
 
@@ -6,12 +6,6 @@ from fgbaseline.geometry import FloatArray
 
 STANDING = 0.1
 """ratio to the 90th percentile of step lengths up to which a step is a standstill, and its direction noise"""
-
-
-def distance_traveled(positions: FloatArray) -> FloatArray:
-    """Cumulative length (T,) of the path through positions (T, 3), m; steps to or from NaN positions count as zero."""
-    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
 
 
 def along_track_frame(positions: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
