@@ -156,8 +156,9 @@ def bootstrapped(
 
     Intervals are percentiles over `repetitions` series of random blocks of the errors, which preserves their
     correlation in time. `block` is by default the longer of Politis and White's for the errors and their squares,
-    and no less than n / MAX_BLOCKS. Infinite errors count in the statistics, which then have no interval. All NaN
-    without an error.
+    and no less than n / MAX_BLOCKS. Infinite errors count in the statistics, which then have no interval. Percentiles
+    that do not contain the statistic are no interval either: so few blocks fit that the drawn series do not spread as
+    the series does, which happens to the standard deviation. All NaN without an error.
     Raises InputError for a confidence outside (0, 1), fewer than 1 repetition, or a block that is not between 1 and n.
     """
     if not 0.0 < confidence < 1.0 or repetitions < 1:
@@ -172,7 +173,9 @@ def bootstrapped(
     statistics = {name: Bounded(value) for name, value in {**_of_series(e), "n": n}.items()}
     if n > 1 and finite:
         for name, (low, high) in _intervals(e, draw_blocks(n, length, repetitions, seed), confidence, of).items():
-            statistics[name] = Bounded(statistics[name].value, low, high)
+            value = statistics[name].value
+            if low <= value <= high or np.isclose(value, (low, high), rtol=1e-9, atol=0.0).any():
+                statistics[name] = Bounded(value, low, high)
     return ErrorStatistics(
         by_name=statistics,
         block=length,

@@ -106,6 +106,22 @@ def test_a_series_too_short_for_its_correlation_is_reported() -> None:
     assert compare.error_statistics(autoregressive(2000, 0.3, 0)).attrs["reliable"]
 
 
+@pytest.mark.parametrize("n", [30, 101, 400])
+@pytest.mark.parametrize("shape", ["ramp", "walk", "wave", "decay"])
+def test_an_interval_contains_its_statistic_or_is_not_stated(n: int, shape: str) -> None:
+    t, rng = np.linspace(0.0, 1.0, n), np.random.default_rng(n)
+    errors = {
+        "ramp": t**3,
+        "walk": np.abs(rng.normal(size=n).cumsum()),
+        "wave": np.abs(np.sin(7.0 * t)),
+        "decay": np.exp(-5.0 * t) + 0.05 * np.abs(rng.normal(size=n)),
+    }[shape]
+    table = compare.error_statistics(errors)
+    stated = table[table["low"].notna()]
+    assert {"rmse", "mean"} <= {*stated.index}
+    assert ((stated["low"] <= stated["value"] + 1e-12) & (stated["value"] <= stated["high"] + 1e-12)).all()
+
+
 def test_one_error_has_no_interval_and_none_has_no_value() -> None:
     one = compare.error_statistics([2.0])
     assert one.loc["rmse", "value"] == 2.0
