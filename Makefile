@@ -86,7 +86,7 @@ lint: install
 	$(BIN)/ruff format --check .
 
 types: install
-	$(BIN)/mypy -p fgbaseline
+	$(BIN)/mypy -p fgbaseline -p benchmarks
 
 arrows: install
 	$(BIN)/lint-imports

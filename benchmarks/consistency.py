@@ -41,7 +41,8 @@ PARTS = 5
 EVERYTHING = MaskSettings(min_disparity=-np.inf, max_row_mismatch=np.inf, prediction_gate=np.inf, min_track=1)
 """There are no wrong matches to find, and a gate along noisy velocities would keep what agrees with their noise."""
 INVERSE_DEPTH = JointSettings(linearization=Linearization.TEXTBOOK)
-COLORS = ESTIMATOR_COLORS | {
+COLORS = {
+    **ESTIMATOR_COLORS,
     "joint-ekf-first-estimate": "#56B4E9",
     "textbook, inverse depth": "#882255",
     "joint-ekf-textbook": "#D55E00",

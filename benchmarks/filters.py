@@ -16,6 +16,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import click
@@ -25,6 +26,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.claim_table import Row, row, table
 from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data import Problem, Sequence
+from fgbaseline.geometry import FloatArray
 from tests.builders.dense_filter import DenseFilter
 
 FEATURES = 1000
@@ -54,7 +56,7 @@ class LiteralFrames:
         self.dense = DenseFilter(problem)
         self.path, _ = self.dense.dead_reckoning()
         self.mean = self.dense.prior_mean
-        self.covariance = np.kron(np.eye(self.dense.M), self.dense.prior_variance)
+        self.covariance: FloatArray = np.kron(np.eye(self.dense.M), self.dense.prior_variance)
 
     def mapping(self, k: int) -> None:
         """Equations 11 and 12 at frame k."""
@@ -90,9 +92,9 @@ def documented(sequence: Sequence, runs: int) -> list[Row]:
         frames = random.choice(np.arange(1, some.n_frames), DENSE_FRAMES, replace=False)
         scale = some.n_frames / DENSE_FRAMES
         ours = cpu_seconds(lambda: chain(some))
-        whole.append(scale * sum(cpu_seconds(lambda k=int(k): literal.chain(k)) for k in frames) / ours)
+        whole.append(scale * sum(cpu_seconds(partial(literal.chain, int(k))) for k in frames) / ours)
         ours = cpu_seconds(lambda: ekf.landmark_mapping(some))
-        mapping.append(scale * sum(cpu_seconds(lambda k=int(k): literal.mapping(k)) for k in frames) / ours)
+        mapping.append(scale * sum(cpu_seconds(partial(literal.mapping, int(k))) for k in frames) / ours)
         more.append(cpu_seconds(lambda: chain(everything)) / cpu_seconds(lambda: chain(some)))
     n = len(some.features)
     times = len(everything.observations()) / len(some.observations())

@@ -18,6 +18,7 @@ import numpy as np
 from fgbaseline.data.tracking import StereoTracker, TrackerSettings
 from fgbaseline.data.tracking.rectification import rectify
 from fgbaseline.data.tracking.sources import ImageRecording, open_recording
+from fgbaseline.geometry import StereoCamera
 
 CALLS = (
     "imdecode", "remap", "resize", "blur", "multiply", "add", "cornerMinEigenVal", "circle", "dilate",
@@ -57,10 +58,13 @@ def main() -> None:
     rectified = rectify(recording.left, recording.right)
     for name in CALLS:
         setattr(cv2, name, Timed(getattr(cv2, name)))
+    assert isinstance(rectified.camera, StereoCamera)
     tracker = StereoTracker(rectified.camera, TrackerSettings())
     pairs = repeated(recording, given.frames) if given.frames else recording.pairs()
     begin, counts = time.process_time(), []
     for pair in pairs:
+        assert pair.left is not None
+        assert pair.right is not None
         tracks = tracker.step(*rectified(pair.left, pair.right))
         counts.append(len(tracks.number))
     spent, n = time.process_time() - begin, len(counts)

@@ -30,11 +30,12 @@ from fgbaseline import compare
 from fgbaseline.compare.residuals.held_out_tracks import cross_prediction_errors
 from fgbaseline.data import HeldOut, Sequence, find_estimator, read
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.diagnosis import calibrated, hold_out
 from fgbaseline.geometry import FloatArray, se3, so3
 
 NAMES = ("dead-reckoning", "ekf", "joint-ekf", "isam2")
-SIMULATED = ("town", "loop", "handheld")
+SIMULATED: tuple[PathName, ...] = ("town", "loop", "handheld")
 AGAINST = ("RPE 1 s, m", "RPE 1 s, deg", "RPE 2 s, m", "RPE 2 s, deg", "ATE, m")
 
 
@@ -72,7 +73,7 @@ def judged(sequence: Sequence, share: float, seed: int) -> Judged:
 def relative(path: FloatArray, truth: FloatArray, t: FloatArray, seconds: float) -> dict[str, float]:
     """RMSE of the motion over so many seconds, from every frame on: m, and degrees."""
     step = max(1, round(seconds / float(np.median(np.diff(t)))))
-    known = np.isfinite(path).all(axis=(1, 2)) & np.isfinite(truth).all(axis=(1, 2))
+    known = np.asarray(np.isfinite(path + truth).all(axis=(1, 2)))
     k = np.flatnonzero(known[:-step] & known[step:])
     moved, true = (se3.inverse(p[k]) @ p[k + step] for p in (path, truth))
     error = se3.inverse(true) @ moved
@@ -84,7 +85,7 @@ def relative(path: FloatArray, truth: FloatArray, t: FloatArray, seconds: float)
 
 
 def aligned(path: FloatArray, truth: FloatArray) -> float:
-    known = np.isfinite(path).all(axis=(1, 2)) & np.isfinite(truth).all(axis=(1, 2))
+    known = np.isfinite(path + truth).all(axis=(1, 2))
     p, q = path[known, :3, 3], truth[known, :3, 3]
     moved = se3.transform(compare.align_se3(p, q), p)
     return float(np.sqrt(np.mean(np.sum((moved - q) ** 2, axis=1))))

@@ -24,13 +24,14 @@ from fgbaseline import compare, data, diagnosis, smoother
 from fgbaseline.compare import cost
 from fgbaseline.data import Estimate, Problem, Sequence, Status
 from fgbaseline.data.simulate import Simulation, simulate
+from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.smoother import ISAM2Settings
 
 MAX_RMSE = 0.05
 """m"""
 MAX_EXCESS = {True: 5e-3, False: 1e-4}
 """largest excess of the cost over batch's, as a share, with and without a kernel"""
-DRIVES = ("town", "loop", "highway", "handheld")
+DRIVES: tuple[PathName, ...] = ("town", "loop", "highway", "handheld")
 
 
 def recordings(files: tuple[Path, ...]) -> Iterator[Sequence]:
@@ -72,7 +73,7 @@ def rmse(estimate: Estimate, batch: Estimate) -> float:
 def two_starts(batch: Estimate) -> str:
     """Event of batch on its two starts."""
     texts = {data.EventKind.SAME_COST: "same", data.EventKind.DIFFERENT_COSTS: "differ"}
-    return next((texts[event.kind] for event in batch.events if event.kind in texts), "one only")
+    return next((text for event in batch.events for kind, text in texts.items() if event.kind == kind), "one only")
 
 
 @click.command()

@@ -60,7 +60,8 @@ def measured(features: float, frames: int) -> dict[str, float]:
     """Seconds of all frames and of their algebra, and the mean number of observations of a frame."""
     problem = posed(Simulation(duration=frames / 10.0, features_per_frame=features, seed=1))
     joint, random = SizedFilter(problem, JointSettings()), np.random.default_rng(0)
-    taken, observed = [], []
+    taken: list[tuple[float, float]] = []
+    observed: list[int] = []
     with threadpool_limits(limits=1, user_api="blas"), np.errstate(all="ignore"):
         for k, seen in enumerate(problem.observations().by_frame(problem.n_frames)):
             joint.sizes = None

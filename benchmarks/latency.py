@@ -80,7 +80,7 @@ class Place:
         """Commands of evo, from an environment with compiled bytecode like ours."""
         python = self.today / "python"
         uv = Path(sys.executable).with_name("uv")
-        installed = [uv, "pip", "install", "--quiet", "--compile-bytecode", "--python", python, "evo"]
+        installed: list[str | Path] = [uv, "pip", "install", "--quiet", "--compile-bytecode", "--python", python, "evo"]
         subprocess.run(installed, check=True)
         return self.today
 
@@ -138,8 +138,8 @@ def _against_ape(place: Place) -> tuple[Side, Side]:
 
 
 def _against_ape_and_rpe(place: Place) -> tuple[Side, Side]:
-    ape = [place.evo / "evo_ape", "tum", *place.pair(LONG), "-a"]
-    rpe = [place.evo / "evo_rpe", "tum", *place.pair(LONG), "-d", "1", "-u", "m", "--all_pairs"]
+    ape: list[str | Path] = [place.evo / "evo_ape", "tum", *place.pair(LONG), "-a"]
+    rpe: list[str | Path] = [place.evo / "evo_rpe", "tum", *place.pair(LONG), "-d", "1", "-u", "m", "--all_pairs"]
     return command(_compare(place, LONG)), command(ape, rpe)
 
 
@@ -155,7 +155,7 @@ def _page(place: Place) -> tuple[Side, Side]:
     sides = []
     for commands, name in ((place.today, "today"), (place.before, "before")):
         out = place.folder / f"comparison-{name}"
-        words = [commands / "fgbaseline", "compare", *place.pair(SHORT), "--out", out, "--force"]
+        words: list[str | Path] = [commands / "fgbaseline", "compare", *place.pair(SHORT), "--out", out, "--force"]
         sides.append(command(words))
     return sides[0], sides[1]
 
@@ -163,9 +163,12 @@ def _page(place: Place) -> tuple[Side, Side]:
 def _beside(place: Place) -> tuple[Side, Side]:
     """Stages of a run but the estimators', each by the benchmark of its own revision."""
 
+    recording = place.recording
+    assert recording is not None
+
     def side(commands: Path) -> Side:
         source = commands.parents[1] / "source"
-        words = [commands / "python", "-m", "benchmarks.run_overhead", place.recording, "--stages"]
+        words: list[str | Path] = [commands / "python", "-m", "benchmarks.run_overhead", recording, "--stages"]
 
         def run() -> Taken:
             text = subprocess.run(

@@ -58,7 +58,7 @@ def drive(n: int) -> Drive:
     twist[:, 5] = 0.03 * np.sin(np.arange(n - 1) / 40.0)
     reference = se3.compose(se3.exp(twist))
     estimate = se3.compose(se3.exp(twist + random.normal(size=twist.shape) * np.repeat([0.01, 0.0003], 3)))
-    return Drive(0.1 * np.arange(n), reference, se3.exp([3.0, 2.0, 1.0, 0.1, 0.2, 0.3]) @ estimate)
+    return Drive(np.linspace(0.0, 0.1 * (n - 1), n), reference, se3.exp([3.0, 2.0, 1.0, 0.1, 0.2, 0.3]) @ estimate)
 
 
 def evo_pair(d: Drive) -> tuple[PoseTrajectory3D, PoseTrajectory3D]:

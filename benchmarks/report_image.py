@@ -11,7 +11,7 @@ import click
 from playwright.sync_api import sync_playwright
 
 NAMES = (os.environ.get("FGBASELINE_CHROMIUM"), "chromium", "chromium-browser", "google-chrome", "chrome")
-SIZE = {"width": 1400, "height": 1250}
+WIDTH, HEIGHT = 1400, 1250
 FRAME = 40
 """frame of the recording that a section shows: late enough for tracks to have tails"""
 
@@ -27,7 +27,7 @@ def main(run: Path, image: Path, section: str | None) -> None:
         raise click.ClickException("there is no Chromium; FGBASELINE_CHROMIUM names one")
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
-        page = browser.new_page(viewport=SIZE, color_scheme="light")
+        page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme="light")
         page.goto((run / "report.html").resolve().as_uri())
         for name in ("landmarks", "ellipses"):
             button = page.locator(f"button[data-do={name}]")

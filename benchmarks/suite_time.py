@@ -61,7 +61,9 @@ def seconds(folder: Path, revision: str | None, tests: Path) -> dict[str, float]
         case for case in ElementTree.parse(report).iter("testcase") if {child.tag for child in case} == {"properties"}
     ]
     return {
-        case.attrib["name"]: float(case.find("properties/property[@name='cpu']").attrib["value"]) for case in passed
+        case.attrib["name"]: float(cpu.attrib["value"])
+        for case in passed
+        for cpu in case.iterfind("properties/property[@name='cpu']")
     }
 
 

@@ -80,8 +80,8 @@ class DenseFilter:
         self.M = len(problem.features)
         self.prior_mean = problem.landmark_prior.mean
         self.prior_variance = problem.landmark_prior.covariance
-        self.V_mapping = problem.mapping_pixel_variance * np.eye(4)
-        self.V_slam = problem.pixel_variance * np.eye(4)
+        self.V_mapping: FloatArray = problem.mapping_pixel_variance * np.eye(4)
+        self.V_slam: FloatArray = problem.pixel_variance * np.eye(4)
         self.K = K_s(problem.sequence.camera)
         self.o_T_I = np.linalg.inv(problem.sequence.imu_T_cam)
         """the report's optical frame from the IMU's"""
