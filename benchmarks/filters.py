@@ -56,7 +56,7 @@ class LiteralFrames:
         self.dense = DenseFilter(problem)
         self.path, _ = self.dense.dead_reckoning()
         self.mean = self.dense.prior_mean
-        self.covariance: FloatArray = np.kron(np.eye(self.dense.M), self.dense.prior_variance)
+        self.covariance = np.kron(np.eye(self.dense.M), self.dense.prior_variance).astype(np.float64)
 
     def mapping(self, k: int) -> None:
         """Equations 11 and 12 at frame k."""
