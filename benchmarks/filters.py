@@ -26,7 +26,6 @@ from threadpoolctl import threadpool_limits
 from benchmarks.claim_table import Row, row, table
 from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data import Problem, Sequence
-from fgbaseline.geometry import FloatArray
 from tests.builders.dense_filter import DenseFilter
 
 FEATURES = 1000

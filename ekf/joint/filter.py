@@ -1,42 +1,31 @@
 """EKF-SLAM frame by frame: prediction, joint update of pose and landmarks, initialization and marginalization."""
 
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 
 from fgbaseline.data.estimate import Event, EventKind, Innovations
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
-from fgbaseline.geometry import FloatArray, se3, so3
-from fgbaseline.geometry.linearization import predict
-from fgbaseline.geometry.measurement_model import back_projected
+from fgbaseline.geometry import FloatArray, se3
 
 from ..motion_model import POSE, MotionModel, motion_model
+from .correction import correct
 from .feature_selection import select_features
 from .gating import GatedObservations, gate_observations
 from .gyro_bias import BiasedVelocityMotion
-from .inverse_depth_prior import common_change, inverse_depths, scene_depth
+from .inverse_depth_prior import common_change
+from .landmark_initialization import new_landmarks
 from .landmark_map import LandmarkMap
-from .landmark_representation import LandmarkRepresentation, chart, coordinates_of, homogeneous
+from .landmark_representation import LandmarkRepresentation
+from .linearized_observations import LinearizedObservations, linearize
 from .process_noise import MAX_REJECTED, ProcessNoise
 from .second_order import second_order, second_order_of
 from .settings import JointSettings, Linearization
-from .state import ABSENT, CommonError, JointState
+from .state import ABSENT, JointState
 from .unknown_depths import MIN_COSINE, UnknownDepths, observed_depths
-from .unobservable_directions import first_estimate_transition, transform_columns
-from .update import CholeskyFactor, Innovation, NotPositiveDefiniteError, StackedJacobian, kalman_update
-
-
-class _LinearizedObservations(NamedTuple):
-    """Linearized observations of n active landmarks."""
-
-    observed: IntArray
-    """(n,) indices into the problem's observations"""
-    H: StackedJacobian
-    residual: FloatArray
-    """(n, r) innovations in the rows of the measurement model, px"""
-    cosine: FloatArray
-    """(n,) cosines of the angle between optical axis and ray"""
+from .unobservable_directions import first_estimate_transition
+from .update import CholeskyFactor, Innovation, NotPositiveDefiniteError, kalman_update
 
 
 class JointFilter:
@@ -68,6 +57,7 @@ class JointFilter:
         self.n_deferred = 0
         """number of observations not used because the state was full"""
         self.process_noise = ProcessNoise(len(self.motion.covariance))
+        self.gate = partial(gate_observations, measurement=self.measurement, settings=settings)
         self.events: list[Event] = []
         self.innovations = Innovations.none(problem.n_frames)
 
@@ -145,7 +135,7 @@ class JointFilter:
         state = self.state
         variance = self._variance(linearized)
         innovation = Innovation.of(linearized.H, linearized.residual, state.P)
-        gated = self._gate(innovation.nis_per_observation(variance))
+        gated = self.gate(innovation.nis_per_observation(variance))
         mean, prior = np.zeros(state.size), state.xi.copy()
         if self.depths is not None and (moved := self._at_observed_depths(self.depths, linearized, variance, gated)):
             linearized, variance, mean = moved
@@ -202,7 +192,7 @@ class JointFilter:
         move[state.n_body :] = (xi - state.xi).ravel()
         self._apply_correction(move)
 
-    def _variance(self, linearized: _LinearizedObservations) -> FloatArray:
+    def _variance(self, linearized: LinearizedObservations) -> FloatArray:
         """Variances (n, r), px^2, of the noise of innovations.
 
         For one camera those of the neglected second-order terms are added, and the square of their mean, which the
@@ -216,10 +206,10 @@ class JointFilter:
     def _at_observed_depths(
         self,
         depths: UnknownDepths,
-        linearized: _LinearizedObservations,
+        linearized: LinearizedObservations,
         variance: FloatArray,
         gated: GatedObservations,
-    ) -> tuple[_LinearizedObservations, FloatArray, FloatArray] | None:
+    ) -> tuple[LinearizedObservations, FloatArray, FloatArray] | None:
         """Move accepted landmarks of unknown depth to what the frame shows (`observed_depths`), and linearize there.
 
         None if there are none. Returns the observations in the order given, their variances (n, r), px^2, and the mean
@@ -256,15 +246,12 @@ class JointFilter:
         Two successive frames disagree with the prediction: where this frame's observations agree with each other, the
         motion between the frames is less certain than modeled.
         """
-        found = self.process_noise.inflate(innovation, self.state.P, variance, self._gate)
+        found = self.process_noise.inflate(innovation, self.state.P, variance, self.gate)
         if found is None:
             return None
         text = f"the motion since the last accepted frame has {found.factor:.0f} times its modeled covariance added"
         self.events.append(Event(k, EventKind.PROCESS_NOISE_INFLATED, text))
         return found.innovation, found.gated
-
-    def _gate(self, nis: FloatArray) -> GatedObservations:
-        return gate_observations(nis, self.measurement, self.settings)
 
     def _record_nis(self, k: int, innovation: Innovation, variance: FloatArray) -> CholeskyFactor | None:
         """Record the NIS of the frame, before kernel and gate; return the factor of S, or None if S has none."""
@@ -276,52 +263,19 @@ class JointFilter:
         self.innovations.nis[k] = factor.nis
         return factor
 
-    def _linearize(self, index: IntArray) -> _LinearizedObservations:
-        state, slot = self.state, self.state.slot_of[self.feature[index]]
-        charts = state.charts[slot]
-        linearized = latest = predict(self.camera, self.cam_T_imu, state.pose, homogeneous(charts, state.xi[slot]))
-        if self.settings.linearization is Linearization.FIRST_ESTIMATE:
-            # Jacobians only; residuals are at the latest estimate
-            linearized = predict(
-                self.camera, self.cam_T_imu, state.predicted.pose, homogeneous(charts, state.first_estimate[slot])
-            )
-        H_pose, H_point = linearized.pose_jacobian(), linearized.point_jacobian()
-        H = StackedJacobian(slot, H_pose, H_point @ charts[:, :, :3], state.n_body)
-        cosine = np.minimum(latest.cosine, linearized.cosine)
-        return _LinearizedObservations(index, H, self.measured[index] - latest.pixel, cosine)
+    def _linearize(self, index: IntArray) -> LinearizedObservations:
+        slot, how = self.state.slot_of[self.feature[index]], self.settings.linearization
+        return linearize(self.state, self.camera, self.cam_T_imu, how, slot, index, self.measured[index])
 
-    def _reject_behind_camera(self, k: int, linearized: _LinearizedObservations) -> _LinearizedObservations:
+    def _reject_behind_camera(self, k: int, linearized: LinearizedObservations) -> LinearizedObservations:
         front = linearized.cosine > MIN_COSINE
         if front.all():
             return linearized
         self._record_rejection(k, EventKind.BEHIND_CAMERA, ~front)
-        return _LinearizedObservations(
-            linearized.observed[front], linearized.H.select(front), linearized.residual[front], linearized.cosine[front]
-        )
+        return linearized.select(front)
 
     def _apply_correction(self, delta: FloatArray) -> None:
-        """Apply the correction delta (size,) to the state, and for `Linearization.INVARIANT` P <- B P B^T.
-
-        B = I + (N+ - N-) A (`unobservable_directions`), with N- before and N+ after the correction, and A = Ad(T-) on
-        the pose's columns. The rows of a landmark in N are its `motion_jacobian`. While the depth of a landmark is
-        unknown, its rows have the translation of its anchor in place of the pose's (`unknown_depths`).
-        """
-        state, n = self.state, self.state.n_body
-        before, anchored = state.body, None if self.depths is None else self.depths.anchored(state)
-        state.body = before.corrected(delta[:n])
-        by = delta[n:].reshape(-1, 3)
-        if self.settings.linearization is not Linearization.INVARIANT:
-            state.xi[:] += by
-            return
-        change = state.correct_landmarks(by)
-        columns = change @ se3.adjoint(before.pose)
-        if anchored is not None:  # a rigid motion [v, w] moves an anchor at p by v + w x p
-            own = change[anchored.slot]
-            by_turn = own[:, :, 3:] + own[:, :, :3] @ so3.hat3(anchored.position)
-            columns[anchored.slot] = np.concatenate([np.zeros_like(by_turn), by_turn @ before.pose[:3, :3]], axis=2)
-            state.transform_by_points(anchored.slot, anchored.anchor, own[:, :, :3])
-        body = transform_columns(before, state.body, delta[:n])
-        state.transform_covariance(np.concatenate([body, columns.reshape(-1, POSE)]))
+        correct(self.state, delta, self.settings.linearization, self.depths)
 
     def _initialize_from_prior(self, row: IntArray) -> None:
         prior, n = self.problem.landmark_prior, len(row)
@@ -331,37 +285,11 @@ class JointFilter:
         self.map.initialized[row] = True
 
     def _initialize_from_observation(self, index: IntArray) -> None:
-        """Initialize landmarks from one observation each, back-projected from the current pose estimate.
-
-        The limit of an update with an uninformative prior: with delta the error of the pose, e that of the coordinates
-        and n that of the pixels, 0 = H_pose delta + H_xi e + n gives e = -H_xi^-1 (H_pose delta + n). One camera lacks
-        a third row; a pseudo-measurement of the inverse depth takes its place, the mean of the scene
-        (`inverse_depth_prior`), whose error all new landmarks share.
-        """
-        n, state = len(index), self.state
-        first_estimate = self.settings.linearization is Linearization.FIRST_ESTIMATE
-        world_T_cam = state.pose @ self.imu_T_cam
-        prior = self.problem.inverse_depth_prior if self.measurement.monocular else None
-        scene = None if prior is None else scene_depth(prior, state, self.cam_T_imu)
-        points = back_projected(self.camera, self.measured[index], np.nan if scene is None else scene.mean)
-        points = points @ world_T_cam.T
-        new_chart = chart(self.settings.coordinates, world_T_cam)
-        xi = coordinates_of(new_chart, points)
-        pose = state.predicted.pose if first_estimate else state.pose
-        predicted = predict(self.camera, self.cam_T_imu, pose, xi @ new_chart[:, :3].T + new_chart[:, 3])
-        r = self.measurement.n_rows
-        H_xi = (predicted.point_jacobian().reshape(r * n, 4) @ new_chart[:, :3]).reshape(n, r, 3)
-        H_pose, variance, common = predicted.pose_jacobian(), self.row_variance, None
-        if scene is not None:
-            _, by_pose, by_xi = inverse_depths(pose, self.cam_T_imu, np.broadcast_to(new_chart, (n, 4, 4)), xi)
-            H_pose, H_xi = (np.concatenate(H, axis=1) for H in ((H_pose, by_pose[:, None]), (H_xi, by_xi[:, None])))
-            variance = np.append(variance, (scene.spread * scene.mean) ** 2)
-        inverse = np.linalg.inv(H_xi)
-        covariance = (inverse * variance) @ np.swapaxes(inverse, 1, 2)
-        if scene is not None:
-            common = CommonError(np.asarray(scene.mean * inverse[:, :, r]), scene.covariance, scene.variance)
-        state.initialize(self.feature[index], new_chart, xi, -inverse @ H_pose, covariance, common)
-        self.map.initialized[self.feature[index]] = True
+        """Initialize landmarks from one observation each; see `new_landmarks`."""
+        row = self.feature[index]
+        new = new_landmarks(self.problem, self.settings, self.state, self.cam_T_imu, self.measured[index])
+        self.state.initialize(row, *new)
+        self.map.initialized[row] = True
         self.used[index] = True
 
     def _marginalize_unseen(self, since: int) -> None:
