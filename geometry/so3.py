@@ -161,3 +161,10 @@ def orthogonality_error(matrix: ArrayLike) -> FloatArray:
         [np.abs(value - 1.0) for value in should_be_one] + [np.abs(value) for value in should_be_zero]
     )
     return result
+
+
+def nearest_rotations(matrices: FloatArray) -> FloatArray:
+    """The rotations (n, 3, 3) nearest to matrices (n, 3, 3) of positive determinant, in the Frobenius norm (SVD)."""
+    U, _, Vt = np.linalg.svd(matrices)
+    result: FloatArray = U @ Vt
+    return result

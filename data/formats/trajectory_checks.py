@@ -64,15 +64,8 @@ def poses_of_matrices(values: FloatArray, line: IntArray) -> FloatArray:
             f"{READ_TOLERANCE:g}); expected r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z"
         )
     rough = defect > EXACT
-    poses[rough, :3, :3] = nearest_rotations(poses[rough, :3, :3])
+    poses[rough, :3, :3] = so3.nearest_rotations(poses[rough, :3, :3])
     return poses
-
-
-def nearest_rotations(matrices: FloatArray) -> FloatArray:
-    """The rotations (n, 3, 3) nearest to matrices (n, 3, 3) of positive determinant, in the Frobenius norm (SVD)."""
-    U, _, Vt = np.linalg.svd(matrices)
-    result: FloatArray = U @ Vt
-    return result
 
 
 def writable(t: FloatArray, world_T_body: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -17,7 +17,7 @@ from .file_errors import FilePath
 from .frame_stamps import read_stamps
 from .npz_archive import NpzArchive
 from .npz_member import write_member
-from .trajectory_checks import EXACT, READ_TOLERANCE, nearest_rotations, writable
+from .trajectory_checks import EXACT, READ_TOLERANCE, writable
 
 KEYS = {"t": "world_T_body", "time_stamps": "ground_truth"}
 """stamps and poses: ours, and those of a recording"""
@@ -85,5 +85,5 @@ def _rigid(key: str, poses: FloatArray, known: BoolArray) -> FloatArray:
             f"{key}: the pose {k} is not a rigid motion: {poses[k].tolist()}; write a pose, or NaN in all its entries"
         )
     rough = defect > EXACT
-    chosen[rough, :3, :3] = nearest_rotations(chosen[rough, :3, :3])
+    chosen[rough, :3, :3] = so3.nearest_rotations(chosen[rough, :3, :3])
     return chosen

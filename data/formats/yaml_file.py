@@ -4,11 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from fgbaseline.geometry import FloatArray, InputError
+from fgbaseline.geometry import FloatArray, InputError, so3
 
 from .field_checks import extrinsic
 from .file_errors import FilePath, regular_file
-from .trajectory_checks import nearest_rotations
 
 MOST_BYTES = 2**20
 FEW_DIGITS = 1e-3
@@ -50,5 +49,5 @@ def pose(value: Any, key: str) -> FloatArray:
         raise InputError(f"{key}: expected a 4x4 matrix, got {str(values)[:60]}") from None
     R = matrix[:3, :3]
     if np.isfinite(matrix).all() and np.linalg.det(R) > 0.0 and np.abs(R @ R.T - np.eye(3)).max() < FEW_DIGITS:
-        R = nearest_rotations(R[None])[0]
+        R = so3.nearest_rotations(R[None])[0]
     return extrinsic(key, R, matrix[:3, 3])

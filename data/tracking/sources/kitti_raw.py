@@ -16,7 +16,6 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
 from ...formats.file_errors import reading, regular_file, shown
-from ...formats.trajectory_checks import nearest_rotations
 from ...observations import IntArray
 from ...sequence import Truth
 from ...wording import plural
@@ -138,7 +137,7 @@ def _matrix(values: dict[str, FloatArray], key: str, columns: int, file: Path) -
 def _rigid(file: Path) -> FloatArray:
     values = _values(file)
     motion = np.eye(4)
-    motion[:3, :3] = nearest_rotations(_matrix(values, "R", 3, file)[None])[0]
+    motion[:3, :3] = so3.nearest_rotations(_matrix(values, "R", 3, file)[None])[0]
     motion[:3, 3:] = _matrix(values, "T", 1, file)
     return motion
 
@@ -149,7 +148,7 @@ def _extrinsic(folder: Path, cameras: dict[str, FloatArray]) -> FloatArray | Non
         return None
     velodyne, imu = (_rigid(folder / name) for name in CALIBRATIONS[1:])
     rectified = np.eye(4)
-    rectified[:3, :3] = nearest_rotations(_matrix(cameras, "R_rect_00", 3, folder / CALIBRATIONS[0])[None])[0]
+    rectified[:3, :3] = so3.nearest_rotations(_matrix(cameras, "R_rect_00", 3, folder / CALIBRATIONS[0])[None])[0]
     return np.asarray(se3.inverse(rectified @ velodyne @ imu))
 
 
