@@ -119,8 +119,11 @@ def difference(name: str) -> str:
 def main(per_module: int, seed: int) -> None:
     """Try mutants, and write the table; survivors are printed with their change."""
     copied()
-    if not (PLACE / "mutants" / "mutmut-stats.json").is_file():
+    stats = PLACE / "mutants" / "mutmut-stats.json"
+    if not stats.is_file():
         mutmut("run", "--max-children", "1", "fgbaseline.compare.acceptance_limits.*")
+    if not stats.is_file():
+        raise click.ClickException("the selected tests do not pass without a mutant: see above")
     chosen = {mutant.name for mutant in sampled(mutants(), per_module or 10**9, seed)}
     mutmut("run", "--max-children", "1", *sorted(chosen))
     everything = mutants()
