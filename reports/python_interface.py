@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from functools import wraps
 from html import escape
 from pathlib import Path
-from typing import Any, Literal, ParamSpec, Protocol, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Protocol, TypeVar, get_args, get_origin
 
 from fgbaseline.data.display import LINES, cut
 from fgbaseline.data.formats.atomic_folder import atomic_folder
@@ -13,8 +13,8 @@ from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.formats.file_errors import FilePath
 from fgbaseline.geometry import InputError
 
-from .tables.table import Table
-from .tables.writers import html
+if TYPE_CHECKING:
+    from .tables.table import Table
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -28,7 +28,7 @@ class _Result(Protocol):
     @property
     def verdict(self) -> list[str]: ...
     @property
-    def text_table(self) -> Table: ...
+    def text_table(self) -> "Table": ...
 
 
 class NotebookResult:
@@ -40,6 +40,8 @@ class NotebookResult:
         return "\n".join(map(cut, [self.heading, *(f"  {text}" for text in self.verdict[: LINES - 1])]))
 
     def _repr_html_(self: _Result) -> str:
+        from .tables.writers import html
+
         sentences = "".join(f"<li>{escape(text)}</li>" for text in self.verdict)
         return f"<b>{escape(self.heading)}</b><ul>{sentences}</ul>{html(self.text_table)}"
 
