@@ -100,8 +100,7 @@ def winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset[
     if most == 1:
         each = listed(f"{figures[row['estimator']]} for {row['estimator']}" for row in (first, *others))
         return f"{case}: {metric.short} {each}; one run does not rank them{left_out}."
-    best = number(first["mean"])
-    tied = [row["estimator"] for row in others if row["tied"] or number(row["mean"]) == best]
+    tied = [row["estimator"] for row in others if row["tied"]]
     smallest = f"{first['estimator']} {figures[first['estimator']]} over {most} runs"
     if tied:
         text = f"{case}: {metric.short} {smallest}; no significant difference from {listed(tied)}"

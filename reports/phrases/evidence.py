@@ -1,10 +1,9 @@
 """Sentences that a run and a comparison share: trust in the reference, sample size, held-out tracks, thresholds."""
 
 from collections.abc import Iterable, Mapping
-from functools import cache
 from typing import TYPE_CHECKING
 
-from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
+from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, is_level
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
 from fgbaseline.data.wording import capitalized, plural
 
@@ -15,8 +14,6 @@ if TYPE_CHECKING:
 
     from fgbaseline.compare import Trust
 
-DEGREES_OF_FREEDOM = 6
-"""degrees of freedom of a pose"""
 FIRST = 6
 """sentences of a verdict that stand above the table"""
 MEANING: Mapping[str, str] = {
@@ -24,14 +21,6 @@ MEANING: Mapping[str, str] = {
     "untrusted": "Divergence from it does not measure accuracy",
 }
 """consequence of a verdict other than `trusted`"""
-
-
-@cache
-def overconfidence_bound() -> float:
-    """Upper bound of the NEES of a single pose, 95 %: a larger mean or median is that of an overconfident estimate."""
-    from fgbaseline.compare import chi_square_bounds
-
-    return float(chi_square_bounds(DEGREES_OF_FREEDOM)[1])
 
 
 def reference_sentence(name: str, trust: "Trust", *, is_compared: bool = True) -> str:
@@ -105,7 +94,8 @@ def held_out_sentences(ranking: "pd.DataFrame", sample: str) -> list[str]:
     medians = {str(name): number(float(median)) for name, median in ranking["median"].items()}
     best, *others = medians
     each = listed(f"{median} px for {name}" for name, median in medians.items())
-    tied = [name for name in others if not ranking["behind_low"][name] > 0.0 or medians[name] == medians[best]]
+    least = ranking["median"].iloc[0]
+    tied = [n for n in others if not ranking["behind_low"][n] > 0.0 or is_level(ranking["median"][n], least)]
     return [f"Held-out error (median over {sample}): {each}.", *no_difference(best, tied, "held-out error")]
 
 

@@ -131,7 +131,7 @@ def consistency(results: Results) -> pd.DataFrame:
             if columns is None:
                 continue
             found = compare.anees_summary(columns)
-            rows.append({"case": case, "estimator": name, **found._asdict(), "verdict": _judged(found)})
+            rows.append({"case": case, "estimator": name, **found._asdict(), "verdict": found.verdict})
     return pd.DataFrame(rows)
 
 
@@ -181,11 +181,3 @@ def _least(trust: pd.Series) -> str:
     """The worst trust in the references of several runs."""
     found = set(trust.dropna())
     return next((word for word in ("untrusted", "doubtful", "trusted") if word in found), "")
-
-
-def _judged(found: compare.AneesSummary) -> str:
-    if not np.isfinite(found.anees):
-        return ""
-    if found.anees > found.high:
-        return "overconfident"
-    return "conservative" if found.anees < found.low else "consistent"
