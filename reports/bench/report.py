@@ -16,15 +16,13 @@ from ..figures.saving import encoded
 from ..formatting import counted
 from ..html.page import Grid, Note, Page, Section, folded, pictures
 from ..html.rendering import render_page
-from ..phrases.bench import FIGURES, TABLE, sentences
+from ..phrases.bench import FIGURES, TABLE, duration, sentences
 from ..results import bench as statistics
-from ..results.bench import ANSWERED, BENCH_METRICS, COSTS, OF_THE_RUN, Results
+from ..results.bench import ANSWERED, BENCH_METRICS, COSTS, OF_THE_RUN, Planned, Results
 from ..results.json_files import INFINITE, at
 from ..results.reader import RunFolder
 from ..tables.bench import main_table, ranking_tables, runs_table
 from ..tables.table import latex, markdown
-from .job import Planned
-from .progress import duration
 from .run_cache import RUNS, RunCache
 from .worker import COSTS as COSTS_FILE
 
@@ -35,8 +33,8 @@ TIMINGS = ("seconds", "frames_per_second")
 COSTS_NOTE = "Time and memory are of this machine and in separate files."
 RANKINGS = (
     '"Above the first" is the mean of the paired differences of the runs, with its 95 % interval. Where the interval '
-    "contains zero, these runs do not separate the two. An estimator with fewer successful runs ranks below those "
-    "with more."
+    "contains zero, or the difference is at most 1 %, these runs do not separate the two. An estimator with fewer "
+    "successful runs ranks below those with more."
 )
 MOST_OPEN = 24
 """rows up to which a table is open from the start"""
@@ -44,8 +42,9 @@ MOST_OPEN = 24
 
 def write_report(name: str, results: Results, cache: RunCache) -> None:
     """Writes the report, each file atomically, `summary.json` last."""
+    cases, costs = statistics.cases(results), statistics.costs(results)
     same = {
-        "cases": statistics.cases(results),
+        "cases": cases,
         "runs": results.runs,
         "rankings": statistics.rankings(results),
         "overall": statistics.overall(results),
@@ -55,13 +54,13 @@ def write_report(name: str, results: Results, cache: RunCache) -> None:
     for title, frame in same.items():
         if len(frame):
             cache.write(f"tables/{title}.csv", _csv(frame))
-    cache.write("costs/cases.csv", _csv(statistics.costs(results)))
+    cache.write("costs/cases.csv", _csv(costs))
     cache.write("costs/runs.csv", _csv(results.costs))
     for folder in ("tables", "costs"):
         table = main_table(results, with_costs=folder == "costs", caption=TABLE)
         cache.write(f"{folder}/table.md", markdown(table).encode())
         cache.write(f"{folder}/table.tex", latex(table).encode())
-    figures = draw(results, statistics.judge(results), statistics.cases(results), statistics.costs(results))
+    figures = draw(results, statistics.judge(results), cases, costs)
     for title, figure in figures.items():
         for form in ("png", "svg"):
             cache.write(f"figures/{title}.{form}", encoded(figure, form))
@@ -106,22 +105,16 @@ def summarize(name: str, results: Results) -> str:
     """`summary.json` for `fgbaseline check`: metrics without timings, the same for the same jobs."""
     runs: dict[str, Any] = {}
     for one in results.planned:
-        record = {
-            "sequence": {"name": one.sequence},
-            "settings": {"seed": one.job.seed, **one.settings},
-            "key": one.job.key,
-        }
         if one.name in results.failures:
             failed = {"status": "failed", "reason": results.failures[one.name]}
-            no_reference: dict[str, Any] = {"name": None, "trust": None, "reasons": []}
-            runs[one.name] = {
-                **record,
-                "reference": no_reference,
+            found: dict[str, Any] = {
+                "reference": {"name": None, "trust": None, "reasons": []},
                 "estimators": dict.fromkeys(one.job.estimators, failed),
             }
         else:
-            summary = results.summaries[one.name]
-            runs[one.name] = {**record, **{part: summary[part] for part in OF_A_RUN}}
+            found = {part: results.summaries[one.name][part] for part in OF_A_RUN}
+        settings = {"seed": one.job.seed, **one.settings}
+        runs[one.name] = {"sequence": {"name": one.sequence}, "settings": settings, "key": one.job.key, **found}
     document = {
         "schema": SCHEMA,
         "suite": name,
@@ -140,14 +133,19 @@ def collect_results(planned: Sequence[Planned], cache: RunCache) -> Results:
     for one in planned:
         if failure := str(cache.record(one.job.key)["failure"]):
             failures[one.name] = failure
-            rows += _failed(one, failure)
+            nothing = {"status": "failed", "reason": failure, **{metric.name: np.nan for metric in BENCH_METRICS}}
+            rows += [{**_of_run(one), "estimator": name, **nothing} for name in one.job.estimators]
             continue
         folder = RunFolder(cache.run(one.job.key))
         summary = folder.summary
-        of_run = _of_run(one, summary)
+        reference, size = summary["reference"], (summary["sequence"]["frames"], summary["problem"]["features"])
+        offered = next(iter(summary["estimators"].values()))["observations"]["offered"]
+        of_run = _of_run(one, reference["name"], reference["trust"], *size, offered)
         spent = json.loads((folder.folder / COSTS_FILE).read_text(encoding="utf-8"))["estimators"]
         for name, estimator in summary["estimators"].items():
-            rows.append({**of_run, **_row(name, estimator)})
+            values = {metric.name: _at(estimator, metric.path) for metric in BENCH_METRICS}
+            status = {"status": estimator["status"], "reason": estimator["reason"]}
+            rows.append({**of_run, "estimator": name, **status, **values})
             if estimator["status"] in ANSWERED:
                 costs.append({**of_run, "estimator": name, **spent[name]})
             if estimator["nees"] is not None:
@@ -161,26 +159,10 @@ def collect_results(planned: Sequence[Planned], cache: RunCache) -> Results:
     return Results(planned, pd.DataFrame(rows), table, summaries, failures, nees, seconds)
 
 
-def _of_run(one: Planned, summary: Mapping[str, Any]) -> dict[str, Any]:
-    reference, size = summary["reference"], (summary["sequence"]["frames"], summary["problem"]["features"])
-    offered = next(iter(summary["estimators"].values()))["observations"]["offered"]
-    return _planned(one, reference["name"], reference["trust"], *size, offered)
-
-
-def _planned(one: Planned, *found: object) -> dict[str, Any]:
+def _of_run(one: Planned, *found: object) -> dict[str, Any]:
     """The first columns of a run: its names, what was `found`, and the settings that vary."""
     names = zip(OF_THE_RUN, (one.name, one.case, one.sequence, one.job.seed, *found), strict=False)
     return {**dict(names), **{f"{name}_asked": words for name, words in one.settings.items()}}
-
-
-def _row(name: str, estimator: Mapping[str, Any]) -> dict[str, Any]:
-    values = {metric.name: _at(estimator, metric.path) for metric in BENCH_METRICS}
-    return {"estimator": name, "status": estimator["status"], "reason": estimator["reason"], **values}
-
-
-def _failed(one: Planned, failure: str) -> list[dict[str, Any]]:
-    nothing = {"status": "failed", "reason": failure, **{metric.name: np.nan for metric in BENCH_METRICS}}
-    return [{**_planned(one), "estimator": name, **nothing} for name in one.job.estimators]
 
 
 def _at(estimator: Mapping[str, Any], path: tuple[str, ...]) -> float:

@@ -46,8 +46,7 @@ class RunCache:
         building = self.run(outcome.key).with_name(outcome.key + PARTIAL)
         shutil.rmtree(building, ignore_errors=True)
         record = {"failure": outcome.failure, "seconds": outcome.seconds}
-        files = {**outcome.files, JOB: json.dumps(record).encode()}
-        for name, content in files.items():
+        for name, content in {**outcome.files, JOB: json.dumps(record).encode()}.items():
             path = building / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
@@ -92,8 +91,8 @@ def open_cache(folder: Path, *, force: bool) -> Iterator[RunCache]:
                 mark.flush()
             (folder / RUNS).mkdir(exist_ok=True)
             cache = RunCache(folder)
-            keep = () if force else [path.name for path in (folder / RUNS).iterdir() if (path / JOB).is_file()]
-            cache.remove_runs(keep=[name for name in keep if not name.endswith(PARTIAL)])
+            names = [] if force else [path.name for path in (folder / RUNS).iterdir()]
+            cache.remove_runs(keep=[name for name in names if cache.has(name) and not name.endswith(PARTIAL)])
             yield cache
     except OSError as error:
         raise InputError(
