@@ -3,11 +3,10 @@
 import math
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-import numpy as np
 import pandas as pd
 
 from fgbaseline.compare import (
@@ -20,13 +19,14 @@ from fgbaseline.compare import (
     time_coverage,
 )
 from fgbaseline.compare.acceptance_limits import Bounds, Outcome
-from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
+from fgbaseline.compare.trajectory_comparison.conventions import Resolved, resolve
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Estimate, Status, Trajectory, Truth
-from fgbaseline.data.formats import Order, read_trajectory_file
+from fgbaseline.data.formats import Order
 from fgbaseline.data.formats.file_errors import FilePath
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..comparison.sources import opened
 from ..phrases.check import bound, number
 
 AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | tuple[FloatArray, FloatArray]
@@ -96,7 +96,9 @@ def assert_accuracy(
         raise AssertionError(f"{estimate.name} failed: {estimate.reason}")
     _require_one_clock(estimate, reference)
     settings = Settings(tolerance=tolerance, time_unit=time_unit, quaternion=quaternion)
-    resolved = resolve([_source(reference, "reference"), _source(estimate, "estimate")], (), settings)
+    given = {"reference": reference, "estimate": estimate}
+    sources = [opened(each, name=name if isinstance(each, tuple) else "") for name, each in given.items()]
+    resolved = resolve(sources, (), settings)
     there, here = (each.trajectory(()) for each in resolved)
     is_oriented = there.oriented and here.oriented
     if rotation_deg is not None or Align(align) is Align.FIRST_POSE:
@@ -150,19 +152,6 @@ def _require_orientations(resolved: list[Resolved], paths: list[Trajectory]) -> 
             raise InputError(f"{file}: it has no orientations; leave out rotation_deg and align='first-pose'")
         if each.order_in_doubt:
             raise InputError(f"{file}: {each.remarks[-1]}".replace("--quaternion", "quaternion"))
-
-
-def _source(path: AnyTrajectory, name: str) -> Source:
-    if isinstance(path, Trajectory):
-        return path
-    if isinstance(path, Estimate | Truth):
-        frames = np.arange(len(path.world_T_imu), dtype=np.float64)
-        name = path.name if isinstance(path, Estimate) else "truth"
-        return replace(Trajectory.of_frames(frames, path.world_T_imu, name), stamped=False)
-    if isinstance(path, tuple):
-        t, poses = path
-        return Trajectory.of_frames(t, poses, name)
-    return read_trajectory_file(path)
 
 
 def _values(tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, float]:

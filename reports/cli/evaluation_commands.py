@@ -194,7 +194,7 @@ def check(
     document = read_document(summary)  # faults of both files are reported before their models are imported
     from ..accuracy_check.command import Outputs
     from ..accuracy_check.command import check as check_measured
-    from ..accuracy_check.limits_file import read_limits
+    from ..accuracy_check.limits import read_limits
     from ..results.reader import read_measured
 
     measured, outputs = read_measured(summary, document), Outputs(junit, markdown, as_json)
