@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.data.formats.file_errors import shown
 from fgbaseline.geometry import InputError
 
@@ -56,9 +57,8 @@ class RunCache:
         """Writes a file of the report atomically."""
         path = self.folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(path.name + PARTIAL)
-        partial.write_bytes(content)
-        partial.replace(path)
+        with atomic_write(path) as file:
+            file.write(content)
 
     def remove_runs(self, *, keep: Collection[str] = ()) -> None:
         """Removes all runs except those to keep, and half-written ones."""

@@ -3,8 +3,9 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias, cast, get_args
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 import numpy as np
 
@@ -21,11 +22,10 @@ from fgbaseline.data import Trajectory
 from fgbaseline.data.formats import ParsedTrajectory, read_landmarks, read_times
 from fgbaseline.data.formats.file_errors import FilePath
 from fgbaseline.data.formats.kitti import read_extrinsic
-from fgbaseline.data.formats.trajectory_opening import OpenedTrajectory
+from fgbaseline.data.formats.trajectory_opening import OpenedTrajectory, split_name
 from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ..run.defaults import names_in
-from .opening import split_name
 from .sources import TrajectoryLike, opened
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ Given: TypeAlias = TrajectoryLike | Source | OpenedTrajectory
 GivenLandmarks: TypeAlias = "Sequence[FilePath] | Mapping[str, FilePath | Landmarks]"
 """`[NAME=]FILE` each, or landmarks by the name of their trajectory"""
 
-NO_RUN = (*get_args(OpenedTrajectory), ParsedTrajectory, Trajectory)
+NO_RUN = OpenedTrajectory | ParsedTrajectory | Trajectory
 """types of a reference that is known to be no run before the model of runs is imported"""
 
 CUT_OFF = 0.01
@@ -84,12 +84,11 @@ def _background(
 
     from .reference_run import load_problem, read_reference_run, reference_in_memory
 
+    run: ReferenceRun | None = None
     if isinstance(reference, Run):
-        run: ReferenceRun | None = reference_in_memory(reference)
+        run = reference_in_memory(reference)
     elif isinstance(reference, str | os.PathLike) and Path(reference).is_dir():
         run = read_reference_run(Path(reference))
-    else:
-        run = None
     return run, *load_problem(settings, run)
 
 
@@ -156,27 +155,21 @@ def _beside(run: "ReferenceRun", wanted: str) -> list[str]:
     if wanted in ("all", "none"):
         return others if wanted == "all" else []
     names = list(names_in(wanted))
-    for name in names:
-        if name not in others:
-            raise InputError(f"beside: the run has no '{name}' besides its reference; it has {', '.join(others)}")
+    if unknown := next((name for name in names if name not in others), None):
+        raise InputError(f"beside: the run has no '{unknown}' besides its reference; it has {', '.join(others)}")
     return names
 
 
 def _named_apart(entries: list[Entry]) -> list[Entry]:
     """Entries with unique names: equal names get the folder's name in front, then a number at the end."""
     given = [entry.name for entry in entries]
-    names = list(given)
-    for i, entry in enumerate(entries):
-        if given.count(entry.name) > 1 and Path(entry.trajectory.source).parent.name:
-            names[i] = f"{Path(entry.trajectory.source).parent.name}-{entry.name}"
-    taken: set[str] = set()
-    for i, name in enumerate(names):
-        names[i] = next(n for n in (name, *(f"{name}-{k}" for k in range(2, len(names) + 2))) if n not in taken)
-        taken.add(names[i])
-    return [
-        replace(e, trajectory=replace(e.trajectory, name=valid_file_name(n)))
-        for e, n in zip(entries, names, strict=True)
-    ]
+    named: dict[str, Entry] = {}
+    for entry in entries:
+        folder = Path(entry.trajectory.source).parent.name
+        name = f"{folder}-{entry.name}" if given.count(entry.name) > 1 and folder else entry.name
+        unique = next(n for n in (name, *(f"{name}-{k}" for k in count(2))) if n not in named)
+        named[unique] = replace(entry, trajectory=replace(entry.trajectory, name=valid_file_name(unique)))
+    return list(named.values())
 
 
 def valid_file_name(name: str) -> str:

@@ -19,11 +19,10 @@ from fgbaseline.data import (
     find_estimator,
 )
 from fgbaseline.data.estimator_runner import no_progress
-from fgbaseline.data.formats.file_errors import FilePath
+from fgbaseline.data.formats.file_errors import FilePath, as_path
 from fgbaseline.data.user_estimator import load_all
 from fgbaseline.geometry import InputError
 
-from ..comparison.opening import as_path
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
 from ..python_arguments import for_python
 from .defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
