@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
+from ..run.defaults import names_in
+
 PATH = click.Path(path_type=Path)
 UNITS = click.Choice(["s", "ms", "us", "ns"])
 BODY = click.Choice(["imu", "camera"])
@@ -144,20 +146,22 @@ held_out = click.option(
 _IMAGES = (
     click.option("--right", type=PATH, metavar="FOLDER", help="Images: folder of the right camera."),
     click.option(
-        "--calibration",
-        type=PATH,
-        metavar="YAML",
-        help="Images: calibration of folders or a bag, Kalibr or OpenCV.",
+        "--calibration", type=PATH, metavar="YAML", help="Images: calibration of folders or a bag, Kalibr or OpenCV."
     ),
     click.option("--times", type=PATH, metavar="FILE", help="Images: stamps of folders, a line for each image."),
-    click.option("--topics", metavar="LEFT[,RIGHT][,IMU]", help="Images: topics of a bag.  [default: by their types]"),
+    click.option(
+        "--topics",
+        metavar="LEFT[,RIGHT][,IMU]",
+        callback=lambda _context, _option, text: names_in(text),
+        help="Images: topics of a bag.  [default: by their types]",
+    ),
     click.option(
         "--cameras",
         type=click.Choice(["stereo", "left"]),
         help="Images: a pair, or the left camera alone; run, diagnose and export then need raw inertial "
         "samples.  [default: what there is]",
     ),
-    click.option("--settings", type=PATH, metavar="TOML", help="Images: settings of the tracker."),
+    click.option("--settings", "tracker", type=PATH, metavar="TOML", help="Images: settings of the tracker."),
 )
 _MOTION = (
     click.option(
