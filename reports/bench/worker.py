@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 
 from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import LandmarkMode, Problem, Progress, Sequence, documented, read
-from fgbaseline.data.estimator_runner import describe, solve_all
+from fgbaseline.data.estimator_runner import Watch, describe, solve_all
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.registry import GROUP
 from fgbaseline.data.simulate import Simulation, simulate
@@ -78,8 +78,9 @@ def _files(job: Job, report: Report) -> dict[str, bytes]:
     kept, held = hold_out(sequence, job.held_out, job.seed) if job.held_out else (sequence, None)
     report("building the problem", 0, 0)
     problem = _problem(kept, job)
-    watch = CostWatch(report)
-    run = compare_all(problem, solve_all(problem, job.estimators, watch), job.record(), held)
+    peak_mb: dict[str, float] = {}
+    estimates = solve_all(problem, job.estimators, _cost_watch(report, peak_mb))
+    run = compare_all(problem, estimates, job.record(), held)
     report("writing", 0, 0)
     with TemporaryDirectory(prefix="fgbaseline-") as place:
         folder = Path(place)
@@ -89,7 +90,7 @@ def _files(job: Job, report: Report) -> dict[str, bytes]:
             summary = write_numbers(run, folder)
             if job.page == "tables":
                 write_page(run, summary, folder, {})
-        (folder / COSTS).write_text(json.dumps(_costs(run, watch.peak_mb), indent=2))
+        (folder / COSTS).write_text(json.dumps(_costs(run, peak_mb), indent=2))
         return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
@@ -135,22 +136,21 @@ def _costs(run: Run, peak_mb: Mapping[str, float]) -> dict[str, object]:
     return {"estimators": {name: {"seconds": seconds[name], "memory_mb": memory[name]} for name in run.results}}
 
 
-class CostWatch:
-    """Measures the peak memory of estimators, one at a time, and reports their progress."""
+def _cost_watch(report: Report, peak_mb: dict[str, float]) -> Watch:
+    """Reports the progress of estimators, one at a time, and puts their peak memory into `peak_mb`.
 
-    def __init__(self, report: Report) -> None:
-        self.peak_mb: dict[str, float] = {}
-        """peak resident memory of the process, MB, by estimator; missing where the system does not measure it"""
-        self._report = report
+    That is the resident memory of the process, MB; an estimator has none where the system does not measure it.
+    """
 
     @contextmanager
-    def __call__(self, name: str) -> Iterator[Progress]:
-        """The `Watch` of `solve_all`."""
-        self._report(name, 0, 0)
+    def watch(name: str) -> Iterator[Progress]:
+        report(name, 0, 0)
         is_reset = _reset_peak()
-        yield lambda done, total, /: self._report(name, done, total)
+        yield lambda done, total, /: report(name, done, total)
         if is_reset and (peak := _peak_mb()) is not None:
-            self.peak_mb[name] = peak
+            peak_mb[name] = peak
+
+    return watch
 
 
 def _reset_peak() -> bool:

@@ -12,8 +12,17 @@ from fgbaseline.compare.trajectory_comparison.computation import TILT
 from fgbaseline.compare.trajectory_comparison.sample_sizes import samples
 
 from ..formatting import counted, grouped, listed, number, per_cent
-from .evidence import held_out_sentences, reference_sentence, sample_requirement
-from .position_errors import error_decompositions, file_resolution, maximum_errors, path_lengths, position_rmse
+from .evidence import (
+    error_decompositions,
+    file_resolution,
+    held_out_sentences,
+    in_pixels,
+    maximum_errors,
+    path_lengths,
+    position_rmse,
+    reference_sentence,
+    sample_requirement,
+)
 
 
 def caption(comparison: Comparison) -> str:
@@ -151,9 +160,8 @@ def _undetermined_alignments(comparison: Comparison) -> list[str]:
 def _rough_intervals(comparison: Comparison) -> list[str]:
     """Estimates with fewer than ten independent blocks."""
     names = [r.name for r in comparison.results.values() if not r.statistics["translation"].reliable]
-    if not names:
-        return []
-    return [f"The 95 % intervals of {listed(names)} are rough, from fewer than 10 independent blocks."]
+    rough = "are rough, from fewer than 10 independent blocks"
+    return [f"The 95 % intervals of {listed(names)} {rough}."] if names else []
 
 
 def _reported_covariances(comparison: Comparison) -> list[str]:
@@ -193,23 +201,20 @@ def _reprojection(comparison: Comparison) -> list[str]:
     medians = {name: float(table["error"].median()) for name, table in tables.items() if table is not None}
     if len(medians) < 2:
         return []
-    each = listed(f"{number(medians[name])} px for {name}" for name in sorted(medians, key=lambda name: medians[name]))
     return [
-        f"Median reprojection error, landmarks triangulated along each trajectory: {each}.",
+        f"Median reprojection error, landmarks triangulated along each trajectory: {in_pixels(medians)}.",
         "This error measures the motion over the length of a track, not drift.",
     ]
 
 
 def _maps(comparison: Comparison) -> list[str]:
-    known = {name: result.map for name, result in comparison.results.items() if result.map is not None}
-    if not known:
-        return []
-    each = listed(
+    each = [
         f"{number(float(table['distance'].median()))} m for {name} ({number(float(table['seen'].median()))} m in the "
         f"camera frame; {counted(len(table), 'common landmark')})"
-        for name, table in known.items()
-    )
-    return [f"Map difference from {comparison.reference.name} (median): {each}."]
+        for name, result in comparison.results.items()
+        if (table := result.map) is not None
+    ]
+    return [f"Map difference from {comparison.reference.name} (median): {listed(each)}."] if each else []
 
 
 def _held_out(comparison: Comparison) -> list[str]:

@@ -34,6 +34,7 @@ from ..formatting import counted, distance, grouped, limit_per_cent, listed, num
 from ..results.evidence import frame_ranges, summarize_sigma
 from .evidence import (
     held_out_sentences,
+    in_pixels,
     reference_sentence,
     reference_sigma_sentence,
     sample_requirement,
@@ -224,10 +225,9 @@ def _common_observations(run: Run) -> list[str]:
             medians[result.name] = reprojection_summary(table[table["observation"].isin(common)])["median"]
     if len(medians) < 2:
         return []
-    each = listed(f"{number(medians[name])} px for {name}" for name in sorted(medians, key=lambda name: medians[name]))
     return [
         f"Median reprojection error over the {counted(len(common), 'observation')} that all estimators with landmark "
-        f"updates used: {each}."
+        f"updates used: {in_pixels(medians)}."
     ]
 
 

@@ -146,13 +146,14 @@ def _predicted(study: Study) -> Claim:
 def _mapped(study: Study) -> Claim:
     mapped = study.mapped[max(study.mapped)]
     apart = float(np.abs(mapped.estimate.world_T_imu - study.staged[0].predicted).max())
+    equal = "are bitwise equal" if apart == 0.0 else f"differ by up to {apart:.2g}"
     before, after = mapped.before.reprojection, mapped.after.reprojection
     return claim_on(
         study,
         "mapping",
         "after the landmark update the trajectory is dead reckoning's, which justifies that update",
         Verdict.IN_PART if apart == 0.0 else Verdict.FALSE,
-        f"{_apart(apart)}, while the median reprojection error of {mapped.after.features} landmarks goes from "
+        f"the trajectories {equal}, while the median reprojection error of {mapped.after.features} landmarks goes from "
         f"{before:.3g} to {after:.3g} px",
         "equal by construction: mapping does not change the poses. The landmarks have the errors of the trajectory",
     )
@@ -227,14 +228,6 @@ def _every_noise(study: Study) -> Claim:
         f"{limit_per_cent(MAX_DISTANCE)} of its length from dead reckoning",
         "landmarks cross the camera plane: " + causes(study, lambda s: s.outcome.apart_rmse, meters),
         f"they fail in {sum(run.breaks for run in repaired)} of {len(repaired)} settings" if repaired else "",
-    )
-
-
-def _apart(difference: float) -> str:
-    return (
-        "the trajectories are bitwise equal"
-        if difference == 0.0
-        else f"the trajectories differ by up to {difference:.2g}"
     )
 
 

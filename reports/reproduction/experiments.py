@@ -12,8 +12,7 @@ from fgbaseline.data.velocity_increments import dead_reckoned_path, increments
 from fgbaseline.diagnosis import Diagnosis, diagnose
 from fgbaseline.geometry import FloatArray, se3
 
-from .recordings import MAPPED, Subject
-from .repair_ablation import Stage, diagnosed_stages, simulated_stages
+from .recordings import MAPPED, Stage, Subject, diagnosed_stages, simulated_stages
 
 LOW_PIXEL_VARIANCE = 0.01
 LOW_MOTION = 1e-6
