@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, cast
 
@@ -167,7 +167,7 @@ def _named_apart(entries: list[Entry]) -> list[Entry]:
     for entry in entries:
         folder = Path(entry.trajectory.source).parent.name
         name = f"{folder}-{entry.name}" if given.count(entry.name) > 1 and folder else entry.name
-        unique = next(n for n in (name, *(f"{name}-{k}" for k in count(2))) if n not in named)
+        unique = next(n for n in chain((name,), (f"{name}-{k}" for k in count(2))) if n not in named)
         named[unique] = replace(entry, trajectory=replace(entry.trajectory, name=valid_file_name(unique)))
     return list(named.values())
 
