@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import click
+from joblib import cpu_count
 from rich.console import Console, Group
 from rich.live import Live
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
@@ -17,7 +18,7 @@ from fgbaseline.data.wording import plural
 
 from ..phrases.bench import duration, sentences
 from ..results.bench import ANSWERED, Planned
-from .executors import Executor, ProgressEvent, cluster, cores, outcomes, processes
+from .executors import Executor, ProgressEvent, cluster, outcomes, processes
 from .plan import plan
 from .run_cache import RunCache, open_cache
 from .suite import read_suite
@@ -37,7 +38,7 @@ def bench(
     name = read.content.name
     place = out or Path("out") / "bench" / name
     with open_cache(place, force=force) as cache:
-        executor = processes(workers or cores(), cache.folder) if scheduler is None else cluster(scheduler)
+        executor = processes(workers or cpu_count(), cache.folder) if scheduler is None else cluster(scheduler)
         _run_jobs(planned, executor, cache)
         with threadpool_limits(limits=1):
             from .report import collect_results, write_report  # matplotlib: not before there is something to draw
@@ -87,9 +88,7 @@ class LineDisplay:
         self._worked, self._ended = self._worked + planned.work, self._ended + 1
         left = (time.monotonic() - self._start) * (self._work / self._worked - 1.0) if self._worked else 0.0
         about = f", about {duration(left)} left" if self._ended < len(self._jobs) else ""
-        print(
-            f"{self._ended} of {len(self._jobs)}{about}: {_summary_line(planned, outcome)}", file=sys.stderr, flush=True
-        )
+        click.echo(f"{self._ended} of {len(self._jobs)}{about}: {_summary_line(planned, outcome)}", err=True)
 
 
 class BarDisplay:

@@ -196,11 +196,6 @@ def cluster(address: str) -> Executor:
     return executor
 
 
-def cores() -> int:
-    """Number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def outcomes(jobs: Iterable[Job], executor: Executor, show: ShowProgress) -> Iterator[Outcome]:
     """Runs jobs and yields their outcomes as they end.
 

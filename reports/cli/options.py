@@ -107,18 +107,6 @@ features = click.option(
     type=FeatureCount(),
     help="Number of landmarks, those with the most observations.  [default: all; with --preset documented 1000]",
 )
-imu = click.option(
-    "--imu",
-    type=PATH,
-    metavar="CSV",
-    help="Raw inertial samples in EuRoC's form, used instead of any motion data of the input.",
-)
-imu_calibration = click.option(
-    "--imu-calibration",
-    type=PATH,
-    metavar="YAML",
-    help="Noise of these samples: EuRoC's sensor.yaml or Kalibr's imu.yaml.  [default: assumed]",
-)
 time_unit = click.option(
     "--time-unit",
     type=UNITS,
@@ -143,7 +131,27 @@ held_out = click.option(
     metavar="SHARE",
     help="Share of the tracks withheld from diagnosis and estimators, and used to rank the trajectories.",
 )
-_IMAGES = (
+_RECORDING = (
+    click.option(
+        "--imu",
+        type=PATH,
+        metavar="CSV",
+        help="Raw inertial samples in EuRoC's form, used instead of any motion data of the input.",
+    ),
+    click.option(
+        "--imu-calibration",
+        type=PATH,
+        metavar="YAML",
+        help="Noise of these samples: EuRoC's sensor.yaml or Kalibr's imu.yaml.  [default: assumed]",
+    ),
+    click.option(
+        "--velocities",
+        type=PATH,
+        metavar="CSV",
+        help="Body velocities: stamp, vx, vy, vz (m/s), wx, wy, wz (rad/s), used instead of any motion data of the "
+        "input.",
+    ),
+    click.option("--extrinsic", type=PATH, metavar="FILE", help="imu_T_cam of the left camera: a line of 12 numbers."),
     click.option("--right", type=PATH, metavar="FOLDER", help="Images: folder of the right camera."),
     click.option(
         "--calibration", type=PATH, metavar="YAML", help="Images: calibration of folders or a bag, Kalibr or OpenCV."
@@ -163,20 +171,10 @@ _IMAGES = (
     ),
     click.option("--settings", "tracker", type=PATH, metavar="TOML", help="Images: settings of the tracker."),
 )
-_MOTION = (
-    click.option(
-        "--velocities",
-        type=PATH,
-        metavar="CSV",
-        help="Body velocities: stamp, vx, vy, vz (m/s), wx, wy, wz (rad/s), used instead of any motion data of the "
-        "input.",
-    ),
-    click.option("--extrinsic", type=PATH, metavar="FILE", help="imu_T_cam of the left camera: a line of 12 numbers."),
-)
 
 
-def images(command: Command) -> Command:
+def recorded(command: Command) -> Command:
     """The options of recordings of images, and of motion given beside them."""
-    for option in reversed((*_MOTION, *_IMAGES)):
+    for option in reversed(_RECORDING):
         command = option(command)
     return command

@@ -60,9 +60,7 @@ from .options import PATH
     "'# up x y z', else 0,0,1 if the inertial samples agree within 0.5°, else the direction that they measure]",
 )
 @options.as_recorded
-@options.imu
-@options.imu_calibration
-@options.images
+@options.recorded
 @options.time_unit
 @options.repairs
 @options.held_out
@@ -118,9 +116,7 @@ def run(
 @click.argument("source", metavar="INPUT", type=PATH)
 @click.option("--out", type=PATH, required=True, help="Npz to write.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
-@options.imu
-@options.imu_calibration
-@options.images
+@options.recorded
 def track(source: Path, out: Path, force: bool, tracker: Path | None, **given: Any) -> int:
     """Track the images in INPUT and write their tracks.
 
@@ -160,9 +156,7 @@ def estimators() -> None:
 @click.option("--out", type=PATH, help="Folder for diagnosis.json, figures and page.")
 @click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json alone on standard output.")
 @click.option("--write-repairs", type=PATH, help="TOML file of the repairs, to edit and to use with run --repairs.")
-@options.imu
-@options.imu_calibration
-@options.images
+@options.recorded
 @options.time_unit
 @click.option("--force", is_flag=True, help="Replace the folder, or the repairs, of an earlier diagnosis.")
 @options.open_page
@@ -199,9 +193,7 @@ def diagnose(
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier export.")
 @options.preset
 @options.features
-@options.imu
-@options.imu_calibration
-@options.images
+@options.recorded
 @options.as_recorded
 @options.repairs
 @options.held_out
