@@ -11,7 +11,7 @@ from fgbaseline.data import Status
 from fgbaseline.data.wording import plural
 
 from ..formatting import limit_per_cent, meters, per_cent, pixels
-from .experiments import Outcome, Staged, Study, path_length
+from .experiments import Outcome, Staged, Study
 from .recordings import PAPER_RECORDINGS, PaperRecording
 
 MIN_CAUSE_FACTOR = 1.5
@@ -130,7 +130,7 @@ def _predicted(study: Study) -> Claim:
     def climb(staged: Staged) -> float:
         return abs(float(staged.predicted[-1, :3, 3] @ staged.stage.sequence.up))
 
-    road, end = path_length(study.predicted), float(study.predicted[-1, :3, 3] @ study.subject.recorded.up)
+    road, end = study.road, float(study.predicted[-1, :3, 3] @ study.subject.recorded.up)
     way = "above" if end > 0 else "below"
     return claim_on(
         study,
@@ -178,7 +178,7 @@ def _works(study: Study) -> Claim:
 
 
 def _like_dead_reckoning(study: Study) -> Claim:
-    now, road = study.recorded, path_length(study.predicted)
+    now, road = study.recorded, study.road
     noisy = now.correction_m > MAX_CORRECTION or now.correction_deg > MAX_CORRECTION
     alike = now.apart_rmse < MAX_DISTANCE * road
     verdict = Verdict.HOLDS if alike and noisy else Verdict.IN_PART if alike or noisy else Verdict.FALSE
@@ -216,7 +216,7 @@ def _low_noise(study: Study) -> Claim:
 def _every_noise(study: Study) -> Claim:
     runs = [*study.swept, *study.held]
     failing = sum(run.breaks for run in runs)
-    off = sum(not run.breaks and not run.apart_rmse < MAX_DISTANCE * path_length(study.predicted) for run in runs)
+    off = sum(not run.breaks and not run.apart_rmse < MAX_DISTANCE * study.road for run in runs)
     verdict = Verdict.HOLDS if failing == len(runs) else Verdict.IN_PART if failing else Verdict.FALSE
     repaired = study.swept_repaired
     return claim_on(
