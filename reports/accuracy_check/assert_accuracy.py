@@ -2,8 +2,6 @@
 
 import math
 import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -33,21 +31,8 @@ AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | tuple[Floa
 """a trajectory, an estimate or the truth of a problem, a file (TUM, KITTI, EuRoC, npz), or stamps (n,) and poses"""
 AT_LEAST = ("coverage", "pairs")
 """metrics with lower limits; all others have upper limits"""
-
-
-@dataclass(frozen=True, slots=True)
-class CheckedMetric:
-    """A metric of a trajectory and its limit."""
-
-    metric: str
-    unit: str
-    value: float
-    bounds: Bounds
-
-    @property
-    def outcome(self) -> Outcome:
-        """Whether the limit holds."""
-        return self.bounds.judge(self.value)
+UNITS = {"coverage": "", "pairs": "", "rotation.rmse": " (°)"}
+"""of metrics that are not in meters"""
 
 
 def assert_accuracy(
@@ -110,14 +95,20 @@ def assert_accuracy(
     values = _values(tables, time_coverage(matched.reference.t, there.t)) | {"pairs": float(len(matched))}
     if not is_oriented:
         del values["rotation.rmse"]
-    checked = [_checked(metric, values[metric], limit) for metric, limit in asked.items() if limit is not None]
-    checked = [each for each in checked if each.metric != "pairs" or each.outcome is not Outcome.HOLDS]
-    if all(each.outcome is Outcome.HOLDS for each in checked):
+    bounds = {
+        metric: Bounds(at_least=limit) if metric in AT_LEAST else Bounds(at_most=limit)
+        for metric, limit in asked.items()
+        if limit is not None and (metric != "pairs" or values[metric] < limit)
+    }
+    if all(limit.judge(values[metric]) is Outcome.HOLDS for metric, limit in bounds.items()):
         return values
     recognized = [
         f"{path.name}: {remark}." for path, each in zip((there, here), resolved, strict=True) for remark in each.remarks
     ]
-    raise AssertionError(_message(checked, aligned, recognized, _drawn(aligned, tables, asked, figure)))
+    drawn = _drawn(aligned, tables, asked, figure)
+    lines = [*_table(bounds, values), aligned.caption, *recognized, f"The figure is in {drawn}"]
+    title = f"{aligned.estimate.name} does not meet its limits, against {aligned.reference.name}:"
+    raise AssertionError("\n".join([title, *lines]))
 
 
 def _require_bounds(asked: dict[str, float | None]) -> None:
@@ -162,11 +153,6 @@ def _values(tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, float
     return dict(sorted(values.items()))
 
 
-def _checked(metric: str, value: float, limit: float) -> CheckedMetric:
-    bounds = Bounds(at_least=limit) if metric in AT_LEAST else Bounds(at_most=limit)
-    return CheckedMetric(metric, {"coverage": "", "pairs": "", "rotation.rmse": "°"}.get(metric, "m"), value, bounds)
-
-
 def _drawn(
     aligned: MatchedTrajectories,
     tables: dict[str, pd.DataFrame],
@@ -182,20 +168,13 @@ def _drawn(
     return path
 
 
-def _message(checked: Sequence[CheckedMetric], aligned: MatchedTrajectories, recognized: list[str], drawn: Path) -> str:
+def _table(bounds: dict[str, Bounds], values: dict[str, float]) -> list[str]:
+    """The lines of the table of limits."""
     rows = [("limit", "metric", "value", "bound", "margin")]
-    for each in checked:
-        unit = f" ({each.unit})" if each.unit else ""
-        margin = number(each.bounds.margin(each.value), sign=True)
-        rows.append((each.outcome.value, each.metric + unit, number(each.value), bound(each.bounds), margin))
+    for metric, limit in bounds.items():
+        value, name = values[metric], metric + UNITS.get(metric, " (m)")
+        rows.append(
+            (limit.judge(value).value, name, number(value), bound(limit), number(limit.margin(value), sign=True))
+        )
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    table = ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join(
-        [
-            f"{aligned.estimate.name} does not meet its limits, against {aligned.reference.name}:",
-            *table,
-            aligned.caption,
-            *recognized,
-            f"The figure is in {drawn}",
-        ]
-    )
+    return ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
