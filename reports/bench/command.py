@@ -19,8 +19,8 @@ from fgbaseline.data.wording import plural
 from ..phrases.bench import duration, sentences
 from ..results.bench import ANSWERED, Planned
 from .executors import Executor, ProgressEvent, cluster, outcomes, processes
+from .folder import RunCache, collect_results, open_cache, write_report
 from .plan import plan
-from .run_cache import RunCache, open_cache
 from .suite import read_suite
 from .worker import Outcome
 
@@ -41,8 +41,6 @@ def bench(
         executor = processes(workers or cpu_count(), cache.folder) if scheduler is None else cluster(scheduler)
         _run_jobs(planned, executor, cache)
         with threadpool_limits(limits=1):
-            from .report import collect_results, write_report  # matplotlib: not before there is something to draw
-
             results = collect_results(planned, cache)
             write_report(name, results, cache)
         cache.remove_runs(keep={one.job.key for one in planned})

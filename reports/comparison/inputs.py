@@ -15,7 +15,7 @@ from fgbaseline.compare.trajectory_comparison.body_frames import (
     with_length_unit_recognized,
     with_lever_arm,
 )
-from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
+from fgbaseline.compare.trajectory_comparison.conventions import Source, resolve
 from fgbaseline.compare.trajectory_comparison.inputs import Entries, Entry
 from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
 from fgbaseline.data import Trajectory
@@ -56,7 +56,7 @@ def read_entries(
     run, problem, held = _background(reference, settings)
     own = opened(cast("Given", reference), settings.form) if run is None else run.trajectory(run.reference)
     sources = [own, *(opened(given, settings.form) for given in estimates)]
-    first, *others = in_one_body(resolve(sources, frame_times(settings, problem), settings), settings, problem, run)
+    first, *others = in_one_body(sources, settings, problem, run)
     beside = []
     if run is not None:
         first = replace(first, landmarks=run.landmarks(run.reference), trust=run.trust)
@@ -93,20 +93,23 @@ def _background(
 
 
 def in_one_body(
-    every: list[Resolved], settings: Settings, problem: "Problem | None", run: "ReferenceRun | None"
+    sources: Sequence[Source], settings: Settings, problem: "Problem | None", run: "ReferenceRun | None" = None
 ) -> list[Entry]:
-    """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
-    times, imu_T_cam = frame_times(settings, problem), _extrinsic(settings, problem)
+    """Entries, the reference first, with the poses of one body: the IMU, or the point of a reference of positions.
+
+    Raises InputError for time units that nothing decides, and for an extrinsic that is needed and not known.
+    """
+    times, imu_T_cam = _frame_times(settings, problem), _extrinsic(settings, problem)
     reference, *estimates = [
         Entry(each.trajectory(times), each.landmarks, each.covariance, each.up, each.up_stated, each.remarks)
-        for each in every
+        for each in resolve(sources, times, settings)
     ]
     bodies: tuple[Body, Body] = ("imu" if run else settings.reference_body, settings.estimate_body)
-    if settings.lever_arm is not None and bodies[0] != bodies[1]:
-        raise InputError(
-            "lever-arm: it already ends at the reference's point; leave out --reference-body and --estimate-body"
-        )
     if settings.lever_arm is not None:
+        if bodies[0] != bodies[1]:
+            raise InputError(
+                "lever-arm: it already ends at the reference's point; leave out --reference-body and --estimate-body"
+            )
         estimates = [with_lever_arm(each, np.array(settings.lever_arm)) for each in estimates]
     elif not reference.trajectory.oriented and bodies[0] != bodies[1]:
         imu_T_cam = _required(imu_T_cam, reference)
@@ -129,7 +132,7 @@ def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:
     return imu_T_cam
 
 
-def frame_times(settings: Settings, problem: "Problem | None") -> list[FloatArray]:
+def _frame_times(settings: Settings, problem: "Problem | None") -> list[FloatArray]:
     """Stamps, s, for files without them: of --times, else of the recording, whose last few may be missing."""
     if settings.times:
         given = settings.times

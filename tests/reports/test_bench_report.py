@@ -16,9 +16,8 @@ from fgbaseline.data import write_npz
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.reports.bench.command import BarDisplay
 from fgbaseline.reports.bench.executors import FileChannel, ProgressEvent, outcomes, processes
+from fgbaseline.reports.bench.folder import collect_results, open_cache, render
 from fgbaseline.reports.bench.plan import plan
-from fgbaseline.reports.bench.report import collect_results, render
-from fgbaseline.reports.bench.run_cache import open_cache
 from fgbaseline.reports.bench.suite import read_suite
 from fgbaseline.reports.bench.worker import Outcome, work
 from fgbaseline.reports.figures.bench import draw
