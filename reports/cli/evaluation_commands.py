@@ -75,9 +75,7 @@ from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, choice, open_pa
 )
 @click.option("--align-body", is_flag=True, help="Remove a constant rotation between the body frames.")
 @click.option(
-    "--sequence",
-    type=PATH,
-    help="The recording, or the folder of fgbaseline export: adds reprojection errors.",
+    "--sequence", type=PATH, help="The recording, or the folder of fgbaseline export: adds reprojection errors."
 )
 @click.option(
     "--landmarks",

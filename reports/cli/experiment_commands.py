@@ -170,11 +170,7 @@ def bench(
     help="Variances V of the sweep, px², of each pixel row.",
 )
 def reproduce(
-    sequence: tuple[Path, ...],
-    out: Path,
-    force: bool,
-    sweep_features: tuple[int, ...],
-    sweep_noise: tuple[float, ...],
+    sequence: tuple[Path, ...], out: Path, force: bool, sweep_features: tuple[int, ...], sweep_noise: tuple[float, ...]
 ) -> int:
     """Draw the source paper's figures and test its claims.
 

@@ -155,10 +155,7 @@ def stages_of(subject: Subject) -> tuple[Diagnosis | None, list[Stage]]:
 
 
 def study_recording(
-    subject: Subject,
-    sweep: SweepSettings,
-    found: tuple[Diagnosis | None, list[Stage]],
-    progress: Progress,
+    subject: Subject, sweep: SweepSettings, found: tuple[Diagnosis | None, list[Stage]], progress: Progress
 ) -> Study:
     """Runs the documented filter on a recording with all settings of the source paper."""
     diagnosis, stages = found
