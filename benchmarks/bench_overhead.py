@@ -21,10 +21,9 @@ from tempfile import TemporaryDirectory
 import click
 from distributed import LocalCluster
 
-from fgbaseline.reports.bench.executors import cluster, outcomes
+from fgbaseline.reports.bench.executors import ProgressEvent, cluster, outcomes
+from fgbaseline.reports.bench.folder import open_cache
 from fgbaseline.reports.bench.plan import plan
-from fgbaseline.reports.bench.progress import ProgressEvent
-from fgbaseline.reports.bench.run_cache import open_cache
 from fgbaseline.reports.bench.suite import read_suite
 
 WORKERS = 2

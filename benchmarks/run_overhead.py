@@ -26,7 +26,7 @@ from tempfile import TemporaryDirectory
 import click
 
 from benchmarks.claim_table import Row, table
-from fgbaseline.reports.cli.main import NEW_OBJECTS
+from fgbaseline.reports.cli import NEW_OBJECTS
 from fgbaseline.reports.run.defaults import DEFAULT_ESTIMATORS
 
 WANTED = 8.0

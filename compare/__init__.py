@@ -42,7 +42,14 @@ if TYPE_CHECKING:
     from .statistics.chi_square import chi_square_bounds, chi_square_quantile, p_value, share_inside_bounds
     from .statistics.descriptive import summarized
     from .statistics.monte_carlo import MeanInterval, mean_interval, monte_carlo_ranking
-    from .statistics.paired_bootstrap import PairedRanking, RmseDifference, paired_ranking, rmse_difference
+    from .statistics.paired_bootstrap import (
+        PairedRanking,
+        RmseDifference,
+        is_claimed,
+        is_level,
+        paired_ranking,
+        rmse_difference,
+    )
     from .trajectory.alignment import Align, Alignment, align, align_se3
     from .trajectory.association import (
         Association,
@@ -121,7 +128,8 @@ else:
             "statistics.chi_square": "chi_square_bounds chi_square_quantile p_value share_inside_bounds",
             "statistics.descriptive": "summarized",
             "statistics.monte_carlo": "MeanInterval mean_interval monte_carlo_ranking",
-            "statistics.paired_bootstrap": "PairedRanking RmseDifference paired_ranking rmse_difference",
+            "statistics.paired_bootstrap": "PairedRanking RmseDifference is_claimed is_level paired_ranking "
+            "rmse_difference",
             "trajectory.alignment": "Align Alignment align align_se3",
             "trajectory.association": "Association MatchedTrajectories associate common_stamps interpolated rankable",
             "trajectory.ate_rpe": "PoseRelation absolute_errors absolute_pose_error matched_pairs relative_errors "
@@ -205,7 +213,9 @@ __all__ = [
     "held_out_ranking",
     "interpolated",
     "interval_coverage",
+    "is_claimed",
     "is_insufficient",
+    "is_level",
     "least_rotation_misfit",
     "length_unit",
     "map_by_depth",

@@ -54,6 +54,15 @@ class AneesSummary(NamedTuple):
     """share of the frames whose average over the runs lies inside its bounds (expected 0.95)"""
     runs: int
 
+    @property
+    def verdict(self) -> str:
+        """`consistent` inside the bounds, `overconfident` above and `conservative` below; empty without a NEES."""
+        if np.isnan(self.anees):
+            return ""
+        if self.anees > self.high:
+            return "overconfident"
+        return "conservative" if self.anees < self.low else "consistent"
+
 
 def anees_summary(columns: Sequence[FloatArray]) -> AneesSummary:
     """ANEES over all frames from the NEES (T,) of each run; NaN without a NEES."""

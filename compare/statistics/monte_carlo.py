@@ -13,6 +13,7 @@ from scipy.special import stdtrit
 from fgbaseline.geometry import FloatArray
 
 from .chi_square import PROBABILITY
+from .paired_bootstrap import is_level
 
 
 class MeanInterval(NamedTuple):
@@ -46,10 +47,11 @@ def monte_carlo_ranking(errors: pd.DataFrame) -> pd.DataFrame:
 
     Columns `rank`, `runs` with an answer, `mean`, `low`, `high`, and the mean paired difference from the best one
     `behind`, `behind_low`, `behind_high` over the runs that both answered. `tied` where that interval is not above
-    zero, as for a single run, which has no interval. An estimator with fewer answers ranks behind all with more,
-    whatever its mean, since failures are more frequent on hard runs; its `behind` can be negative. Estimators with
-    equally many answers are averaged over the runs that all of them answered, so that order and `behind` agree; where
-    there is no such run, `behind` of those with as many answers as the first is NaN, and they are tied.
+    zero, as for a single run, which has no interval, or where the mean over these runs is at most 1 % larger (see
+    `is_level`). An estimator with fewer answers ranks behind all with more, whatever its mean, since failures are more
+    frequent on hard runs; its `behind` can be negative. Estimators with equally many answers are averaged over the runs
+    that all of them answered, so that order and `behind` agree; where there is no such run, `behind` of those with as
+    many answers as the first is NaN, and they are tied.
     """
     columns = ["rank", "runs", "mean", "low", "high", "behind", "behind_low", "behind_high", "tied"]
     values = {str(name): errors[name].to_numpy(dtype=np.float64) for name in errors}
@@ -66,13 +68,15 @@ def monte_carlo_ranking(errors: pd.DataFrame) -> pd.DataFrame:
     order = sorted((name for name in values if answers[name]), key=lambda name: (-answers[name], means[name].value))
     rows = []
     for rank, name in enumerate(order, 1):
+        own, first = values[name], values[order[0]]
         with np.errstate(invalid="ignore"):
-            apart = np.where(values[name] == values[order[0]], 0.0, values[name] - values[order[0]])
+            apart = np.where(own == first, 0.0, own - first)
         if answers[name] == answers[order[0]] and answers[name] in unpaired and rank > 1:
             apart = np.full_like(apart, np.nan)
         behind = mean_interval(apart)
         infinite = behind.value == np.inf and behind.n > 1
-        tied = rank == 1 or not (behind.low > 0.0 or infinite)
+        smaller = mean_interval(np.where(np.isnan(own), np.nan, first)).value
+        tied = rank == 1 or not (behind.low > 0.0 or infinite) or is_level(smaller + behind.value, smaller)
         mean = means[name]
         rows.append((rank, answers[name], mean.value, mean.low, mean.high, behind.value, behind.low, behind.high, tied))
     return pd.DataFrame(rows, columns=columns, index=pd.Index(order, name="estimator"))

@@ -1,7 +1,7 @@
 """Paired block bootstrap: differences of RMSE between estimates over the same stamps, and their ranking."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +10,10 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from .block_bootstrap import MAX_BLOCKS, MIN_BLOCKS, REPETITIONS, block_length
 from .bootstrap_resampling import CONFIDENCE, draw_blocks, percentile_interval
+
+MIN_DIFFERENCE = 0.01
+"""smallest difference of two errors that is claimed, as a share of the smaller: paired errors make less significant,
+but it has no consequence"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +34,16 @@ class RmseDifference:
     def settled(self) -> bool:
         """Whether the interval excludes zero on the side of the difference."""
         return (self.low > 0.0 and self.value > 0.0) or (self.high < 0.0 and self.value < 0.0)
+
+
+def is_level(larger: float, smaller: float) -> bool:
+    """Whether an error exceeds another by at most `MIN_DIFFERENCE`, if at all."""
+    return larger <= (1.0 + MIN_DIFFERENCE) * smaller
+
+
+def is_claimed(difference: RmseDifference, larger: float, smaller: float) -> bool:
+    """Whether an RMSE is larger than another, significantly and by more than `MIN_DIFFERENCE`."""
+    return difference.settled and difference.value > 0.0 and larger > smaller and not is_level(larger, smaller)
 
 
 def rmse_difference(
@@ -81,6 +95,12 @@ class PairedRanking:
     """RMSE of each but the first minus that of the first; value >= 0 where both are finite"""
     moments: int
     """number of stamps at which all of them have an error"""
+    errors: Mapping[str, FloatArray] = field(default_factory=dict, repr=False, compare=False)
+    """(moments,) by name, in that order"""
+
+    def difference(self, name: str, other: str) -> RmseDifference:
+        """RMSE of one minus that of another, over the stamps at which all of them have an error."""
+        return rmse_difference(self.errors[name], self.errors[other])
 
 
 def paired_ranking(errors: Mapping[str, ArrayLike], *, seed: int = 0) -> PairedRanking:
@@ -99,6 +119,6 @@ def paired_ranking(errors: Mapping[str, ArrayLike], *, seed: int = 0) -> PairedR
         return PairedRanking({}, {}, 0)
     rmse = {name: float(np.sqrt(np.mean(column**2))) for name, column in common.items()}
     order = sorted(rmse, key=lambda name: rmse[name])
-    first = common[order[0]]
-    behind = {name: rmse_difference(common[name], first, seed=seed) for name in order[1:]}
-    return PairedRanking({name: rmse[name] for name in order}, behind, int(np.sum(everywhere)))
+    common = {name: common[name] for name in order}
+    behind = {name: rmse_difference(common[name], common[order[0]], seed=seed) for name in order[1:]}
+    return PairedRanking({name: rmse[name] for name in order}, behind, int(np.sum(everywhere)), common)

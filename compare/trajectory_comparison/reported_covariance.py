@@ -6,6 +6,7 @@ import numpy as np
 
 from fgbaseline import compare
 from fgbaseline.compare import Align, Association, CovarianceState, MatchedTrajectories
+from fgbaseline.compare.overconfidence import overconfidence_bound
 from fgbaseline.compare.trajectory_comparison.inputs import Entry
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.data.display import Displayed
@@ -29,6 +30,16 @@ class ReportedCovariance(Displayed):
     """number of covariances that are not positive definite"""
     remark: str = ""
     """remark on changes of errors and covariances by the alignment"""
+
+    @property
+    def known(self) -> FloatArray:
+        """NEES (m,) of the poses that have one."""
+        return np.asarray(self.nees[~np.isnan(self.nees)])
+
+    @property
+    def is_overconfident(self) -> bool:
+        """Whether the mean NEES exceeds the bound of a single pose."""
+        return bool(np.mean(self.known) > overconfidence_bound())
 
 
 def reported_covariance(reference: Entry, entry: Entry, matched: MatchedTrajectories) -> ReportedCovariance:

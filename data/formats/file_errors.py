@@ -4,10 +4,16 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from fgbaseline.geometry import InputError
 
 FilePath = str | os.PathLike[str]
+
+
+def as_path(given: Any) -> Any:
+    """A name as a path; anything in memory, and None, as it is."""
+    return Path(given) if isinstance(given, str | os.PathLike) else given
 
 
 def shown(path: FilePath) -> str:

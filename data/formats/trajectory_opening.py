@@ -4,6 +4,7 @@ Stamps and poses are checked later (`trajectory_text_parser`). This module is pl
 file is reported before numpy is imported. A comparison opens all of its files before it parses the first.
 """
 
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, get_args
@@ -54,6 +55,22 @@ class TrajectoryTopic:
 
 
 OpenedTrajectory = TrajectoryText | TrajectoryArchive | TrajectoryTopic
+
+
+def open_named(given: FilePath, form: TrajectoryFormat | None = None) -> OpenedTrajectory:
+    """Opens a `[NAME=]FILE`: see `split_name` and `open_trajectory`."""
+    name, file = split_name(os.fspath(given))
+    return open_trajectory(file, form, name)
+
+
+def split_name(given: str) -> tuple[str | None, str]:
+    """Name and file of `NAME=FILE`; an existing file of that whole name has no name part."""
+    name, mark, file = given.partition("=")
+    if not mark or Path(given).exists() or "/" in name:
+        return None, given
+    if not name or not file:
+        raise InputError(f"{shown(given)}: expected FILE or NAME=FILE")
+    return name, file
 
 
 def open_trajectory(path: FilePath, form: TrajectoryFormat | None = None, name: str | None = None) -> OpenedTrajectory:

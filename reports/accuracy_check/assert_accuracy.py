@@ -2,12 +2,9 @@
 
 import math
 import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-import numpy as np
 import pandas as pd
 
 from fgbaseline.compare import (
@@ -20,34 +17,22 @@ from fgbaseline.compare import (
     time_coverage,
 )
 from fgbaseline.compare.acceptance_limits import Bounds, Outcome
-from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
+from fgbaseline.compare.trajectory_comparison.conventions import Resolved, resolve
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Estimate, Status, Trajectory, Truth
-from fgbaseline.data.formats import Order, read_trajectory_file
+from fgbaseline.data.formats import Order
 from fgbaseline.data.formats.file_errors import FilePath
 from fgbaseline.geometry import FloatArray, InputError
 
+from ..comparison.sources import opened
 from ..phrases.check import bound, number
 
 AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | tuple[FloatArray, FloatArray]
 """a trajectory, an estimate or the truth of a problem, a file (TUM, KITTI, EuRoC, npz), or stamps (n,) and poses"""
 AT_LEAST = ("coverage", "pairs")
 """metrics with lower limits; all others have upper limits"""
-
-
-@dataclass(frozen=True, slots=True)
-class CheckedMetric:
-    """A metric of a trajectory and its limit."""
-
-    metric: str
-    unit: str
-    value: float
-    bounds: Bounds
-
-    @property
-    def outcome(self) -> Outcome:
-        """Whether the limit holds."""
-        return self.bounds.judge(self.value)
+UNITS = {"coverage": "", "pairs": "", "rotation.rmse": " (°)"}
+"""of metrics that are not in meters"""
 
 
 def assert_accuracy(
@@ -96,7 +81,9 @@ def assert_accuracy(
         raise AssertionError(f"{estimate.name} failed: {estimate.reason}")
     _require_one_clock(estimate, reference)
     settings = Settings(tolerance=tolerance, time_unit=time_unit, quaternion=quaternion)
-    resolved = resolve([_source(reference, "reference"), _source(estimate, "estimate")], (), settings)
+    given = {"reference": reference, "estimate": estimate}
+    sources = [opened(each, name=name if isinstance(each, tuple) else "") for name, each in given.items()]
+    resolved = resolve(sources, (), settings)
     there, here = (each.trajectory(()) for each in resolved)
     is_oriented = there.oriented and here.oriented
     if rotation_deg is not None or Align(align) is Align.FIRST_POSE:
@@ -108,14 +95,20 @@ def assert_accuracy(
     values = _values(tables, time_coverage(matched.reference.t, there.t)) | {"pairs": float(len(matched))}
     if not is_oriented:
         del values["rotation.rmse"]
-    checked = [_checked(metric, values[metric], limit) for metric, limit in asked.items() if limit is not None]
-    checked = [each for each in checked if each.metric != "pairs" or each.outcome is not Outcome.HOLDS]
-    if all(each.outcome is Outcome.HOLDS for each in checked):
+    bounds = {
+        metric: Bounds(at_least=limit) if metric in AT_LEAST else Bounds(at_most=limit)
+        for metric, limit in asked.items()
+        if limit is not None and (metric != "pairs" or values[metric] < limit)
+    }
+    if all(limit.judge(values[metric]) is Outcome.HOLDS for metric, limit in bounds.items()):
         return values
     recognized = [
         f"{path.name}: {remark}." for path, each in zip((there, here), resolved, strict=True) for remark in each.remarks
     ]
-    raise AssertionError(_message(checked, aligned, recognized, _drawn(aligned, tables, asked, figure)))
+    drawn = _drawn(aligned, tables, asked, figure)
+    lines = [*_table(bounds, values), aligned.caption, *recognized, f"The figure is in {drawn}"]
+    title = f"{aligned.estimate.name} does not meet its limits, against {aligned.reference.name}:"
+    raise AssertionError("\n".join([title, *lines]))
 
 
 def _require_bounds(asked: dict[str, float | None]) -> None:
@@ -152,30 +145,12 @@ def _require_orientations(resolved: list[Resolved], paths: list[Trajectory]) -> 
             raise InputError(f"{file}: {each.remarks[-1]}".replace("--quaternion", "quaternion"))
 
 
-def _source(path: AnyTrajectory, name: str) -> Source:
-    if isinstance(path, Trajectory):
-        return path
-    if isinstance(path, Estimate | Truth):
-        frames = np.arange(len(path.world_T_imu), dtype=np.float64)
-        name = path.name if isinstance(path, Estimate) else "truth"
-        return replace(Trajectory.of_frames(frames, path.world_T_imu, name), stamped=False)
-    if isinstance(path, tuple):
-        t, poses = path
-        return Trajectory.of_frames(t, poses, name)
-    return read_trajectory_file(path)
-
-
 def _values(tables: dict[str, pd.DataFrame], coverage: float) -> dict[str, float]:
     values = {"coverage": coverage, "rotation.rmse": summarized(tables["ate"]["rotation_deg"])["rmse"]}
     for name, table in tables.items():
         statistics = summarized(table["translation"])
         values |= {f"{name}.rmse": statistics["rmse"], f"{name}.max": statistics["max"]}
     return dict(sorted(values.items()))
-
-
-def _checked(metric: str, value: float, limit: float) -> CheckedMetric:
-    bounds = Bounds(at_least=limit) if metric in AT_LEAST else Bounds(at_most=limit)
-    return CheckedMetric(metric, {"coverage": "", "pairs": "", "rotation.rmse": "°"}.get(metric, "m"), value, bounds)
 
 
 def _drawn(
@@ -193,20 +168,13 @@ def _drawn(
     return path
 
 
-def _message(checked: Sequence[CheckedMetric], aligned: MatchedTrajectories, recognized: list[str], drawn: Path) -> str:
+def _table(bounds: dict[str, Bounds], values: dict[str, float]) -> list[str]:
+    """The lines of the table of limits."""
     rows = [("limit", "metric", "value", "bound", "margin")]
-    for each in checked:
-        unit = f" ({each.unit})" if each.unit else ""
-        margin = number(each.bounds.margin(each.value), sign=True)
-        rows.append((each.outcome.value, each.metric + unit, number(each.value), bound(each.bounds), margin))
+    for metric, limit in bounds.items():
+        value, name = values[metric], metric + UNITS.get(metric, " (m)")
+        rows.append(
+            (limit.judge(value).value, name, number(value), bound(limit), number(limit.margin(value), sign=True))
+        )
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    table = ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join(
-        [
-            f"{aligned.estimate.name} does not meet its limits, against {aligned.reference.name}:",
-            *table,
-            aligned.caption,
-            *recognized,
-            f"The figure is in {drawn}",
-        ]
-    )
+    return ["  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -4,7 +4,6 @@ These are the terminal, Markdown for a pull request, JSON, and JUnit XML, which 
 """
 
 import json
-import math
 import os
 import re
 from collections.abc import Mapping
@@ -26,13 +25,13 @@ from fgbaseline.geometry import InputError
 from ..formatting import md
 from ..phrases.check import bound, remarks, verdict
 from ..results.check import Checked, Line
+from ..results.json_files import finite
 from ..results.reader import Measured, read_measured
 from ..tables.check import cells, check_table, unit_of
 from ..tables.writers import UNWRAPPED, print_table
 from ..tables.writers import markdown as markdown_table
-from .baseline import refusal, require_replaceable, write_baseline
 from .evaluation import evaluate
-from .limits_file import Limits
+from .limits import Limits, refusal, require_replaceable, write_baseline
 
 SCHEMA = "fgbaseline/check/1"
 STYLES: Mapping[str, str] = {Outcome.HOLDS: "green", Outcome.UNDECIDED: "yellow", Outcome.VIOLATED: "bold red"}
@@ -83,7 +82,7 @@ def check(
 def _write(checked: Checked, outputs: Outputs) -> None:
     """Writes all files or none, and GitHub's summary of the job."""
     texts = (
-        (outputs.junit, junit(checked)),
+        (outputs.junit, junit(checked).encode()),
         (outputs.markdown, markdown(checked).encode()),
         (outputs.json, as_json(checked).encode()),
     )
@@ -136,12 +135,13 @@ def as_json(checked: Checked) -> str:
         "shortages": list(checked.shortages),
         "references": list(checked.references),
         "reference_sigmas": list(checked.sigmas),
-        "lines": [_line(line) for line in checked.lines],
+        "lines": [finite(_line(line)) for line in checked.lines],
     }
     return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def _line(line: Line) -> dict[str, Any]:
+    bounds, shortage = line.bounds, line.shortage
     return {
         "outcome": line.outcome.value,
         "run": line.run,
@@ -149,73 +149,67 @@ def _line(line: Line) -> dict[str, Any]:
         "metric": line.metric,
         "unit": unit_of(line.metric),
         "value": line.value,
-        "at_least": None if line.bounds is None else _finite(line.bounds.at_least),
-        "at_most": None if line.bounds is None else _finite(line.bounds.at_most),
+        "at_least": None if bounds is None else bounds.at_least,
+        "at_most": None if bounds is None else bounds.at_most,
         "tolerance": line.tolerance,
         "margin": line.margin,
         "baseline": line.before,
         "change": line.change,
         "reason": line.reason,
         "missing": line.missing,
-        "sample": None if line.shortage is None else line.shortage.n,
-        "coverage": None if line.shortage is None else line.shortage.coverage,
+        "sample": None if shortage is None else shortage.n,
+        "coverage": None if shortage is None else shortage.coverage,
         "limit": line.limit,
     }
 
 
-def _finite(bound: float) -> float | None:
-    return bound if math.isfinite(bound) else None
+def junit(checked: Checked) -> str:
+    """The JUnit document; a violated limit is a failure, an undecided one an error.
 
-
-def junit(checked: Checked) -> bytes:
-    """The JUnit document, in UTF-8; a violated limit is a failure, an undecided one an error."""
-    suites = ElementTree.Element("testsuites", {"name": "fgbaseline check", **_counts(checked.lines)})
+    An untrusted reference has a case of its own: without one, a report without failures would be green.
+    """
+    n_references = int(checked.undecided)
+    suites = ElementTree.Element("testsuites", {"name": "fgbaseline check", **_counts(checked.lines, n_references)})
     for run in dict.fromkeys(line.run for line in checked.lines):
         lines = tuple(line for line in checked.lines if line.run == run)
-        suite = ElementTree.SubElement(suites, "testsuite", {"name": _text(run or "trajectories"), **_counts(lines)})
+        suite = ElementTree.SubElement(suites, "testsuite", {"name": run or "trajectories", **_counts(lines)})
         for line in lines:
             _case(suite, line, checked)
-        if sentences := checked.notices:
-            ElementTree.SubElement(suite, "system-out").text = _text("\n".join(sentences))
+        if checked.notices:
+            ElementTree.SubElement(suite, "system-out").text = "\n".join(checked.notices)
     if checked.undecided:
-        _reference_suite(suites, checked)
+        suite = ElementTree.SubElement(suites, "testsuite", {"name": "reference", **_counts((), n_references)})
+        case, reasons = (
+            ElementTree.SubElement(suite, "testcase", classname="reference", name="trust"),
+            checked.references,
+        )
+        _problem(case, Outcome.UNDECIDED, " ".join(reasons), " ".join(reasons))
     ElementTree.indent(suites)
-    document: bytes = ElementTree.tostring(suites, encoding="utf-8", xml_declaration=True)
-    return document + b"\n"
+    document = NOT_XML.sub("?", ElementTree.tostring(suites, encoding="unicode"))
+    return f"<?xml version='1.0' encoding='utf-8'?>\n{document}\n"
 
 
 def _case(suite: ElementTree.Element, line: Line, checked: Checked) -> None:
     asked = f"beside its baseline ({line.tolerance} allowed)" if line.tolerance else bound(line.bounds)
     name = f"{line.metric} {asked}"  # without the baseline's value: the name identifies the test from run to run
-    case = ElementTree.SubElement(suite, "testcase", classname=_text(line.estimator), name=_text(name))
-    if line.outcome is Outcome.HOLDS:
-        return
-    tag = "failure" if line.outcome is Outcome.VIOLATED else "error"
-    texts = cells(line)
-    reason = line.reason or f"{texts['value']} is not {texts['bound']}"
-    problem = ElementTree.SubElement(case, tag, type=line.outcome.value, message=_text(f"{line.metric}: {reason}"))
-    texts_of = [f"{title}: {text}" for title, text in texts.items()]
-    problem.text = _text("\n".join([*texts_of, f"{checked.limits}, {line.limit}"]))
+    case = ElementTree.SubElement(suite, "testcase", classname=line.estimator, name=name)
+    if line.outcome is not Outcome.HOLDS:
+        texts = cells(line)
+        reason = line.reason or f"{texts['value']} is not {texts['bound']}"
+        detail = [*(f"{title}: {text}" for title, text in texts.items()), f"{checked.limits}, {line.limit}"]
+        _problem(case, line.outcome, f"{line.metric}: {reason}", "\n".join(detail))
 
 
-def _reference_suite(suites: ElementTree.Element, checked: Checked) -> None:
-    """A separate case for an untrusted reference: without one, a report without failures would be green."""
-    suite = ElementTree.SubElement(suites, "testsuite", name="reference", tests="1", failures="0", errors="1")
-    case = ElementTree.SubElement(suite, "testcase", classname="reference", name="trust")
-    message = " ".join(checked.references)
-    ElementTree.SubElement(case, "error", type=Outcome.UNDECIDED.value, message=_text(message)).text = _text(message)
-    for count in ("tests", "errors"):
-        suites.set(count, str(int(suites.get(count, "0")) + 1))
+def _problem(case: ElementTree.Element, outcome: Outcome, message: str, text: str) -> None:
+    tag = "failure" if outcome is Outcome.VIOLATED else "error"
+    ElementTree.SubElement(case, tag, type=outcome.value, message=message).text = text
 
 
-def _counts(lines: tuple[Line, ...]) -> dict[str, str]:
+def _counts(lines: tuple[Line, ...], n_references: int = 0) -> dict[str, str]:
+    """Attributes with the number of tests, of which `n_references` are on untrusted references."""
     outcomes = [line.outcome for line in lines]
     return {
-        "tests": str(len(lines)),
+        "tests": str(len(lines) + n_references),
         "failures": str(outcomes.count(Outcome.VIOLATED)),
-        "errors": str(outcomes.count(Outcome.UNDECIDED)),
+        "errors": str(outcomes.count(Outcome.UNDECIDED) + n_references),
     }
-
-
-def _text(text: str) -> str:
-    return NOT_XML.sub("?", text)

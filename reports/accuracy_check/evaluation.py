@@ -28,8 +28,7 @@ from ..results.reader import (
     sample_of,
     value_of,
 )
-from .baseline import baseline_value, is_timing
-from .limits_file import Limit, Limits, Needed
+from .limits import Limit, Limits, Needed, baseline_value, is_timing
 
 
 def evaluate(
@@ -109,12 +108,19 @@ def _lines(
     value, missing = value_of(values, limit.metric)
     old, unknown = baseline_value(baseline, name, run, estimator, limit.metric)
     shortage = _shortage(limits.content, limit, values)
-    doubt = shortage.reason if shortage else _doubt(limit.metric, run, limits.content.reference) or _below(limit, run)
+    doubt = shortage.reason if shortage else _doubt(limit, run, limits.content.reference)
+
+    left_out, place = missing_in(values, limit.metric), f"limit[{index}]"
 
     def line(value: float | None, bounds: Bounds | None, tolerance: str) -> Line:
-        short = failure(values) is not None or missing in (INFINITE, NO_SUCH_METRIC)
-        outcome, reason = _outcome(value, missing, bounds, NEW if updating else unknown, doubt, updating, short)
-        left_out, place = missing_in(values, limit.metric), f"limit[{index}]"
+        outcome, reason = Outcome.UNDECIDED, doubt or unknown
+        if value is None:
+            is_fault = failure(values) is not None or missing in (INFINITE, NO_SUCH_METRIC)
+            outcome, reason = Outcome.VIOLATED if is_fault else Outcome.UNDECIDED, missing
+        elif not doubt and bounds is not None:
+            outcome, reason = bounds.judge(value), ""
+        elif not doubt and updating:
+            outcome, reason = Outcome.HOLDS, NEW
         return Line(
             name, estimator, limit.metric, place, outcome, value, bounds, tolerance, old, reason, left_out, shortage
         )
@@ -127,40 +133,23 @@ def _lines(
         yield line(None if value is None else rounded(value, DIGITS), bounds, by.text)
 
 
-def _outcome(
-    value: float | None, missing: str, bounds: Bounds | None, unknown: str, doubt: str, updating: bool, short: bool
-) -> tuple[Outcome, str]:
-    if value is None:
-        return Outcome.VIOLATED if short else Outcome.UNDECIDED, missing
-    if doubt:
-        return Outcome.UNDECIDED, doubt
-    if bounds is None:
-        return Outcome.HOLDS if updating else Outcome.UNDECIDED, unknown
-    return bounds.judge(value), ""
-
-
-def _doubt(metric: str, run: MeasuredRun, needed: Needed) -> str:
-    """Why a metric is undecided: guessed units, or the reference; empty where neither applies."""
+def _doubt(limit: Limit, run: MeasuredRun, needed: Needed) -> str:
+    """Why a limit is undecided: guessed units, the reference or its sigma; empty where none of them applies."""
     if run.guessed_units:
         return (
             f"the units of the recording ({', '.join(run.guessed_units)}) were estimated from its data; specify them "
             "with run --time-unit, or with a table [units] in --repairs"
         )
-    if not run.rests_on_reference(metric) or not is_undertrusted(run, needed):
-        return ""
-    return f"the reference is {run.reference.trust}"
-
-
-def _below(limit: Limit, run: MeasuredRun) -> str:
-    """Why a limit asks for more than the reference resolves; empty where it does not, or is not to be judged so."""
+    if run.rests_on_reference(limit.metric) and is_undertrusted(run, needed):
+        return f"the reference is {run.reference.trust}"
     if not limit.within_reference_sigma or limit.at_most is None:
         return ""
     sigma = None if run.reference.sigma is None else run.reference.sigma.of(limit.metric)
     if sigma is None:
         return "the sigma of the reference is unknown (within_reference_sigma)"
-    unit = "°" if "rotation" in limit.metric else " m"
     if limit.at_most >= sigma:
         return ""
+    unit = "°" if "rotation" in limit.metric else " m"
     return f"the limit is below the sigma of the reference, {number(sigma)}{unit} (within_reference_sigma)"
 
 
@@ -171,10 +160,10 @@ def _shortage(limits: Limits, limit: Limit, values: Mapping[str, Any]) -> Shorta
     coverage = limits.smallest_coverage if limit.smallest_coverage is None else limit.smallest_coverage
     if sample is None or not is_insufficient(sample, smallest, coverage):
         return None
-    stretches = int(sample.get("stretches", MIN_STRETCHES))
-    if sample["n"] >= smallest and stretches < MIN_STRETCHES:
-        return Shortage(stretches, sample.get("coverage"), MIN_STRETCHES, coverage)
-    return Shortage(int(sample["n"]), sample.get("coverage"), smallest, coverage)
+    n, stretches = int(sample["n"]), int(sample.get("stretches", MIN_STRETCHES))
+    if n >= smallest and stretches < MIN_STRETCHES:
+        n, smallest = stretches, MIN_STRETCHES
+    return Shortage(n, sample.get("coverage"), smallest, coverage)
 
 
 def _require_baseline(limits: TomlFile[Limits], index: int, limit: Limit, *, given: bool) -> None:

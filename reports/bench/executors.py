@@ -1,11 +1,13 @@
-"""Executors of jobs, processes of this machine or workers of a Dask cluster, and the outcomes of the jobs."""
+"""Executors of jobs, processes of this machine or workers of a Dask cluster, their progress, and the jobs' outcomes."""
 
 import contextlib
+import json
 import os
 import shutil
 import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +17,7 @@ from uuid import uuid4
 
 from fgbaseline.geometry import InputError
 
-from .job import Job
-from .progress import TOPIC, EventChannel, FileChannel, ProgressEvent
+from ..results.bench import Job
 from .worker import Outcome, work
 
 ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}
@@ -24,8 +25,72 @@ SECONDS_TO_CONNECT = 5
 PARENT_POLL = 0.5
 """s between two checks of a worker process that its parent is alive"""
 PROGRESS = "progress"
+TOPIC = "fgbaseline-bench"
+INTERVAL = 0.3
+"""s between two progress events of the same step"""
 POLL = 0.1
 """s between two checks of the jobs"""
+
+
+@dataclass(frozen=True, slots=True)
+class ProgressEvent:
+    """Current step of a worker."""
+
+    worker: str
+    key: str
+    """key of its job; empty without a job"""
+    doing: str
+    """an estimator's name, or `reading` and `writing`"""
+    done: int
+    total: int
+    """frames; 0 where they are not counted"""
+
+
+@dataclass(frozen=True, slots=True)
+class FileChannel:
+    """Channel with one file per process in a folder."""
+
+    folder: Path
+
+    def __call__(self, key: str, doing: str, done: int, total: int) -> None:
+        """Reports progress, at most every `INTERVAL`."""
+        if _is_due(key, doing):
+            place = self.folder / str(os.getpid())
+            partial = place.with_suffix(".partial")
+            with contextlib.suppress(OSError):  # the folder is gone when the bench has ended
+                partial.write_text(json.dumps([key, doing, done, total]))
+                partial.replace(place)
+
+    def events(self) -> Iterator[ProgressEvent]:
+        """Yields the last event of each worker."""
+        for place in sorted(self.folder.iterdir()):
+            if place.suffix == "":
+                with contextlib.suppress(OSError, ValueError):
+                    yield ProgressEvent(place.name, *json.loads(place.read_text()))
+
+
+def send_to_scheduler(key: str, doing: str, done: int, total: int) -> None:
+    """Channel of Dask events, which the scheduler forwards, at most every `INTERVAL`."""
+    if _is_due(key, doing):
+        from distributed import get_worker
+
+        worker = get_worker()
+        worker.log_event(TOPIC, [worker.name, key, doing, done, total])
+
+
+_last = ("", "", 0.0)
+
+
+def _is_due(key: str, doing: str) -> bool:
+    """Whether the step is new or its last event is older than `INTERVAL`; then the event counts as sent."""
+    global _last
+    now = time.monotonic()
+    if _last[:2] == (key, doing) and now - _last[2] < INTERVAL:
+        return False
+    _last = (key, doing, now)
+    return True
+
+
 ShowProgress: TypeAlias = Callable[[Iterable[ProgressEvent]], None]
 """takes the last event of each worker, regularly"""
 
@@ -115,7 +180,7 @@ def cluster(address: str) -> Executor:
 
         def submit(job: Job) -> Future:
             key = f"fgbaseline-{job.key}-{uuid4().hex[:8]}"
-            future: Future = client.submit(work, job, EventChannel(), key=key, pure=False, retries=0)
+            future: Future = client.submit(work, job, send_to_scheduler, key=key, pure=False, retries=0)
             return future
 
         try:
@@ -131,11 +196,6 @@ def cluster(address: str) -> Executor:
     return executor
 
 
-def cores() -> int:
-    """Number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def outcomes(jobs: Iterable[Job], executor: Executor, show: ShowProgress) -> Iterator[Outcome]:
     """Runs jobs and yields their outcomes as they end.
 
@@ -145,50 +205,39 @@ def outcomes(jobs: Iterable[Job], executor: Executor, show: ShowProgress) -> Ite
     left = {job.key: job for job in jobs}
     while left:
         with executor() as workers:
-            for outcome in _until_one_dies(workers, list(left.values()), show):
-                del left[outcome.key]
-                yield outcome
+            with contextlib.suppress(BrokenProcessPool):
+                for outcome in _until_one_dies(workers, list(left.values()), show):
+                    del left[outcome.key]
+                    yield outcome
             begun = {event.key for event in workers.events()}
         for job in [job for key, job in left.items() if key in begun or not begun & left.keys()]:
-            yield _alone(job, executor, show)
+            with executor(1) as workers:
+                try:
+                    yield from _until_one_dies(workers, [job], show)
+                except BrokenProcessPool as error:
+                    yield _dead(job.key, error)
             del left[job.key]
 
 
 def _until_one_dies(workers: Workers, jobs: list[Job], show: ShowProgress) -> Iterator[Outcome]:
+    """Outcomes of the jobs; raises BrokenProcessPool where a pool of processes breaks, after those that have ended."""
     futures: dict[str, Future] = {job.key: workers.submit(job) for job in jobs}
-    is_broken = False
-    while futures and not is_broken:
+    broken = None
+    while futures and broken is None:
         time.sleep(POLL)
         show(workers.events())
         for key in [key for key, future in futures.items() if future.done()]:
             try:
                 outcome = futures[key].result()
+            except BrokenProcessPool as error:
+                broken = error
+                continue
             except Exception as error:
-                if _breaks_pool(error):
-                    is_broken = True
-                    continue
                 outcome = _dead(key, error)
             del futures[key]
             yield outcome
-
-
-def _alone(job: Job, executor: Executor, show: ShowProgress) -> Outcome:
-    with executor(1) as workers:
-        future = workers.submit(job)
-        while not future.done():
-            time.sleep(POLL)
-            show(workers.events())
-        try:
-            return future.result()
-        except Exception as error:
-            return _dead(job.key, error)
-
-
-def _breaks_pool(error: Exception) -> bool:
-    """Whether the error ends all workers: a pool of processes breaks as a whole, a cluster does not."""
-    from concurrent.futures.process import BrokenProcessPool
-
-    return isinstance(error, BrokenProcessPool)
+    if broken is not None:
+        raise broken
 
 
 def _dead(key: str, error: Exception) -> Outcome:

@@ -7,15 +7,16 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from fgbaseline.data import estimator_names, read
+from fgbaseline.data import read
 from fgbaseline.data.simulate import Simulation
 from fgbaseline.data.toml_file import Place, TomlFile, key_path
 from fgbaseline.diagnosis import read_repairs
 from fgbaseline.geometry import InputError
 
+from ..results.bench import File, Job, Planned, Recorded, Simulated
 from ..run.settings import check_estimators
-from .job import File, Job, Planned, Recorded, Simulated, code_hash, file_hash
 from .suite import DriveError, Entry, Suite, drives, several
+from .worker import code_hash, file_hash
 
 MOST_JOBS = 100_000
 
@@ -38,9 +39,8 @@ def plan(suite: TomlFile[Suite], data: Path | None) -> list[Planned]:
     """
     _check_estimators(suite)
     sweep = _settings(suite)
-    varied = {name for name in sweep[0] if len({_words(settings[name]) for settings in sweep}) > 1}
-    content = suite.content
-    code = code_hash(content.estimators, content.page != "none")
+    varied = sorted(name for name in sweep[0] if len({_words(settings[name]) for settings in sweep}) > 1)
+    content, code = suite.content, code_hash(suite.content.estimators, suite.content.page != "none")
     jobs: list[Planned] = []
     names: dict[str, int] = {}
     for index, entry in enumerate(content.sequence):
@@ -50,15 +50,10 @@ def plan(suite: TomlFile[Suite], data: Path | None) -> list[Planned]:
                 raise suite.wrong(("sequence", index), f"'{each.name}' is the name of {other} too; add a name")
             names[each.name] = index
             for settings, seed in product(sweep, each.seeds):
-                job = Job(
-                    source=each.source,
-                    seed=seed,
-                    estimators=content.estimators,
-                    page=content.page,
-                    code=code,
-                    **settings,
-                )
-                jobs.append(_planned(job, each, {name: _words(settings[name]) for name in sorted(varied)}))
+                job = Job(each.source, seed, **settings, estimators=content.estimators, page=content.page, code=code)
+                words = {name: _words(settings[name]) for name in varied}
+                case = " ".join([each.name, *(f"{name}={text}" for name, text in words.items())])
+                jobs.append(Planned(job, case, each.name, words, each.observations, each.has_seed))
                 if len(jobs) > MOST_JOBS:
                     raise suite.wrong((), f"the suite has more than {MOST_JOBS} jobs; reduce its settings or seeds")
     for index, entry in enumerate(content.sequence):
@@ -66,19 +61,13 @@ def plan(suite: TomlFile[Suite], data: Path | None) -> list[Planned]:
     return jobs
 
 
-def _planned(job: Job, each: Input, settings: Mapping[str, str]) -> Planned:
-    case = " ".join([each.name, *(f"{name}={words}" for name, words in settings.items())])
-    return Planned(job, case, each.name, settings, each.observations, each.has_seed)
-
-
 def _check_estimators(suite: TomlFile[Suite]) -> None:
     names = suite.content.estimators
-    for index, name in enumerate(names):
-        if name not in estimator_names() or name in names[:index]:
-            try:
-                check_estimators(names[: index + 1])
-            except InputError as error:
-                raise suite.wrong(("estimators", index), str(error)) from None
+    for index in range(len(names)):
+        try:
+            check_estimators(names[: index + 1])
+        except InputError as error:
+            raise suite.wrong(("estimators", index), str(error)) from None
 
 
 def _settings(suite: TomlFile[Suite]) -> list[dict[str, Any]]:
@@ -132,16 +121,14 @@ def _words(value: Any) -> str:
 def _inputs(suite: TomlFile[Suite], index: int, entry: Entry, data: Path | None) -> Iterator[Input]:
     place: Place = ("sequence", index)
     if entry.simulate is None:
-        for name, source, observations in _recordings(suite, index, entry, data):
-            yield Input(name, source, (0,), observations, has_seed=False)
+        yield from _recordings(suite, index, entry, data)
         return
     try:
         found = list(drives(entry.simulate))
     except DriveError as error:
         raise suite.wrong((*place, "simulate", error.setting), str(error)) from None
-    base = entry.name or "simulated"
     for settings, varied in found:
-        name = " ".join([base, *(f"{key}={_words(value)}" for key, value in varied.items())])
+        name = " ".join([entry.name or "simulated", *(f"{key}={_words(value)}" for key, value in varied.items())])
         drive = Simulation(**settings)
         observations = drive.seconds * drive.rate * drive.features_per_frame
         yield Input(name, Simulated(settings), entry.seed_numbers, observations, has_seed=entry.seeds is not None)
@@ -152,17 +139,16 @@ def _check_repairs(suite: TomlFile[Suite], index: int, entry: Entry, sweep: list
         return
     place: Place = ("sequence", index, "repairs")
     for settings in sweep:
-        if settings["preset"] == "documented" or settings["noise"] == "assumed":
-            why = "the documented preset" if settings["preset"] == "documented" else 'noise = "assumed"'
-            raise suite.wrong(place, f"{why} uses no repairs; leave out one of the two")
+        if settings["preset"] == "documented":
+            raise suite.wrong(place, "the documented preset uses no repairs; leave out one of the two")
+        if settings["noise"] == "assumed":
+            raise suite.wrong(place, 'noise = "assumed" uses no repairs; leave out one of the two')
         if isinstance(settings["noise"], Mapping):
             raise suite.wrong(place, "[sweep] sets the noise too; leave out one of the two")
 
 
-def _recordings(
-    suite: TomlFile[Suite], index: int, entry: Entry, data: Path | None
-) -> Iterator[tuple[str, Recorded, float]]:
-    """Yields name, source and number of observations of each. Raises InputError with the key path."""
+def _recordings(suite: TomlFile[Suite], index: int, entry: Entry, data: Path | None) -> Iterator[Input]:
+    """Reads each recording. Raises InputError with the key path."""
     folder = (data or Path(suite.path).parent).absolute()
     found = _files(suite, index, entry, folder)
     truth = None if entry.truth is None else folder / entry.truth
@@ -181,7 +167,7 @@ def _recordings(
         except InputError as error:
             raise suite.wrong(place, str(error)) from None
         source = Recorded(File(str(path), file_hash(path)), _file(truth), entry.truth_frame, _file(repairs))
-        yield entry.name or path.stem, source, float(len(sequence.observations))
+        yield Input(entry.name or path.stem, source, (0,), float(len(sequence.observations)), has_seed=False)
 
 
 def _files(suite: TomlFile[Suite], index: int, entry: Entry, folder: Path) -> list[tuple[Path, Place]]:

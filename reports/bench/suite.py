@@ -24,7 +24,11 @@ Features: TypeAlias = Annotated[int, Field(ge=1)] | Literal["all"]
 Noise: TypeAlias = Literal["estimated", "assumed"] | SigmaOverrides
 Share: TypeAlias = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 Seed: TypeAlias = Annotated[int, Field(ge=0)]
+Landmarks: TypeAlias = Literal["in-turn", "held"]
 MOST_SEEDS, MOST_STEPS, MOST_DRIVES = 10_000, 1000, 10_000
+Item = TypeVar("Item")
+OneOrMore: TypeAlias = Item | Annotated[tuple[Item, ...], Field(min_length=1)]
+"""a value, or a list of values"""
 
 
 class Range(Part):
@@ -103,7 +107,7 @@ class Entry(Part):
 
     name: Name | None = None
     """name of drives, or of a single recording; other recordings have the names of their files"""
-    files: str | Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    files: OneOrMore[str] | None = None
     """paths or globs; relative ones from the suite's folder, or from --data"""
     leave_out: str | tuple[str, ...] = ()
     """globs of files to exclude from `files`"""
@@ -147,16 +151,14 @@ class Entry(Part):
 class Sweep(Part):
     """Settings of the runs; every combination of the listed values is run."""
 
-    preset: Preset | Annotated[tuple[Preset, ...], Field(min_length=1)] = "calibrated"
-    features: Features | Annotated[tuple[Features, ...], Field(min_length=1)] | None = None
+    preset: OneOrMore[Preset] = "calibrated"
+    features: OneOrMore[Features] | None = None
     """None for the preset's default"""
-    noise: Noise | Annotated[tuple[Noise, ...], Field(min_length=1)] | None = None
+    noise: OneOrMore[Noise] | None = None
     """noise of the calibrated preset: estimated from the recording (default), assumed, or given standard deviations"""
-    landmarks: (
-        Literal["in-turn", "held"] | Annotated[tuple[Literal["in-turn", "held"], ...], Field(min_length=1)] | None
-    ) = None
+    landmarks: OneOrMore[Landmarks] | None = None
     """landmark mode of the documented preset"""
-    held_out: Share | Annotated[tuple[Share, ...], Field(min_length=1)] = 0.0
+    held_out: OneOrMore[Share] = 0.0
 
 
 class Suite(Part):
@@ -168,9 +170,6 @@ class Suite(Part):
     """report of each run: none, with tables only, or with figures"""
     sweep: Sweep = Sweep()
     sequence: Annotated[tuple[Entry, ...], Field(min_length=1)]
-
-
-Item = TypeVar("Item")
 
 
 def several(value: Item | tuple[Item, ...]) -> tuple[Item, ...]:

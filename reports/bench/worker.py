@@ -1,10 +1,18 @@
-"""Work of a worker process: a job in, the files of its run out as bytes. GTSAM objects do not leave it."""
+"""Work of a worker process: a job in, the files of its run out as bytes. GTSAM objects do not leave it.
 
+A worker refuses a job whose files or code have changed since it was planned; the hashes of both are part of its key.
+"""
+
+import hashlib
 import json
+import platform
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache, partial
+from importlib.metadata import PackageNotFoundError, entry_points, version
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
@@ -13,17 +21,20 @@ from threadpoolctl import threadpool_limits
 
 from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import LandmarkMode, Problem, Progress, Sequence, documented, read
-from fgbaseline.data.estimator_runner import describe, solve_all
+from fgbaseline.data.estimator_runner import Watch, describe, solve_all
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
+from fgbaseline.data.registry import GROUP
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.diagnosis import AsRecordedSettings, calibrated, hold_out, read_repairs
 from fgbaseline.diagnosis.repair_overrides.settings import Repairs
 from fgbaseline.geometry import FgbaselineError
 
+from ..results.bench import File, Job, Recorded
 from ..run.folder import write_numbers, write_page, write_run
-from .job import File, Job, Recorded, code_hash, file_hash
 
 COSTS = "costs.json"
+LIBRARIES = ("gtsam", "numpy", "scipy", "pandas", "threadpoolctl")
+ROOMS = ("geometry", "data", "diagnosis", "ekf", "smoother", "compare")
 RESET_PEAK = "5"
 """makes Linux reset the peak memory (man 5 proc, clear_refs)"""
 Channel = Callable[[str, str, int, int], None]
@@ -48,20 +59,15 @@ class Outcome:
 
 def work(job: Job, channel: Channel) -> Outcome:
     """Runs a job; an error is its outcome, and never raised."""
-    key = job.key
-
-    def report(doing: str, done: int, total: int) -> None:
-        channel(key, doing, done, total)
-
     with _one_job, threadpool_limits(limits=1):
         start = time.perf_counter()
         try:
-            files, failure = _files(job, report), ""
+            files, failure = _files(job, partial(channel, job.key)), ""
         except Exception as error:  # a job never stops the others
             files, failure = {}, describe(error)
         seconds = time.perf_counter() - start
     channel("", "", 0, 0)
-    return Outcome(key, files, failure, seconds)
+    return Outcome(job.key, files, failure, seconds)
 
 
 def _files(job: Job, report: Report) -> dict[str, bytes]:
@@ -72,13 +78,19 @@ def _files(job: Job, report: Report) -> dict[str, bytes]:
     kept, held = hold_out(sequence, job.held_out, job.seed) if job.held_out else (sequence, None)
     report("building the problem", 0, 0)
     problem = _problem(kept, job)
-    watch = CostWatch(report)
-    run = compare_all(problem, solve_all(problem, job.estimators, watch), job.record(), held)
+    peak_mb: dict[str, float] = {}
+    estimates = solve_all(problem, job.estimators, _cost_watch(report, peak_mb))
+    run = compare_all(problem, estimates, job.record(), held)
     report("writing", 0, 0)
     with TemporaryDirectory(prefix="fgbaseline-") as place:
         folder = Path(place)
-        _write(run, folder, job)
-        (folder / COSTS).write_text(json.dumps(_costs(run, watch.peak_mb), indent=2))
+        if job.page == "figures":
+            write_run(run, folder)
+        else:
+            summary = write_numbers(run, folder)
+            if job.page == "tables":
+                write_page(run, summary, folder, {})
+        (folder / COSTS).write_text(json.dumps(_costs(run, peak_mb), indent=2))
         return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
@@ -107,50 +119,38 @@ def _problem(sequence: Sequence, job: Job) -> Problem:
         return documented(sequence, count, LandmarkMode(job.landmarks))
     if job.noise == "assumed":
         return calibrated(sequence, features, settings=AsRecordedSettings())
-    repairs = None
-    if isinstance(job.source, Recorded) and job.source.repairs is not None:
-        repairs = read_repairs(job.source.repairs.path)
     if isinstance(job.noise, Mapping):
-        repairs = Repairs.model_validate({"sigma": dict(job.noise)})
+        repairs: Repairs | None = Repairs.model_validate({"sigma": dict(job.noise)})
+    elif isinstance(job.source, Recorded) and job.source.repairs is not None:
+        repairs = read_repairs(job.source.repairs.path)
+    else:
+        repairs = None
     return calibrated(sequence, features, repairs=repairs)
-
-
-def _write(run: Run, folder: Path, job: Job) -> None:
-    if job.page == "figures":
-        write_run(run, folder)
-        return
-    summary = write_numbers(run, folder)
-    if job.page == "tables":
-        write_page(run, summary, folder, {})
 
 
 def _costs(run: Run, peak_mb: Mapping[str, float]) -> dict[str, object]:
     """Costs by estimator; a by-product has the cost of its run."""
     source = {by: name for name, r in run.results.items() for by in r.estimate.by_products if by not in peak_mb}
-    return {
-        "estimators": {
-            name: {"seconds": r.estimate.seconds_total, "memory_mb": peak_mb.get(source.get(name, name))}
-            for name, r in run.results.items()
-        }
-    }
+    memory = {name: peak_mb.get(source.get(name, name)) for name in run.results}
+    seconds = {name: result.estimate.seconds_total for name, result in run.results.items()}
+    return {"estimators": {name: {"seconds": seconds[name], "memory_mb": memory[name]} for name in run.results}}
 
 
-class CostWatch:
-    """Measures the peak memory of estimators, one at a time, and reports their progress."""
+def _cost_watch(report: Report, peak_mb: dict[str, float]) -> Watch:
+    """Reports the progress of estimators, one at a time, and puts their peak memory into `peak_mb`.
 
-    def __init__(self, report: Report) -> None:
-        self.peak_mb: dict[str, float] = {}
-        """peak resident memory of the process, MB, by estimator; missing where the system does not measure it"""
-        self._report = report
+    That is the resident memory of the process, MB; an estimator has none where the system does not measure it.
+    """
 
     @contextmanager
-    def __call__(self, name: str) -> Iterator[Progress]:
-        """The `Watch` of `solve_all`."""
-        self._report(name, 0, 0)
+    def watch(name: str) -> Iterator[Progress]:
+        report(name, 0, 0)
         is_reset = _reset_peak()
-        yield lambda done, total, /: self._report(name, done, total)
+        yield lambda done, total, /: report(name, done, total)
         if is_reset and (peak := _peak_mb()) is not None:
-            self.peak_mb[name] = peak
+            peak_mb[name] = peak
+
+    return watch
 
 
 def _reset_peak() -> bool:
@@ -166,3 +166,53 @@ def _peak_mb() -> float | None:
         if line.startswith("VmHWM:"):
             return int(line.split()[1]) * 1024 / 1e6
     return None
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@cache
+def code_hash(estimators: tuple[str, ...], pages: bool) -> str:
+    """SHA-256 of our source that a job runs, of other packages' estimators, and of the libraries' versions.
+
+    Any change to that source makes every job run again; a change to the report of a bench does not.
+    """
+    digest = hashlib.sha256(platform.python_version().encode())
+    for library in LIBRARIES:
+        digest.update(f"{library} {version(library)}\n".encode())
+    for file in sorted({*_our_files(pages), *_estimator_files(estimators)}):
+        digest.update(f"{file.parent.name}/{file.name}\n".encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
+def _our_files(pages: bool) -> Iterator[Path]:
+    for room in ROOMS:
+        yield from _folder(f"fgbaseline.{room}").rglob("*.py")
+    reports = _folder("fgbaseline.reports")
+    yield from reports.glob("*.py")
+    yield reports / "bench" / "worker.py"
+    for part in ("results", "run", "tables", *(("figures", "html", "phrases") if pages else ())):
+        yield from (file for file in (reports / part).rglob("*") if file.suffix in (".py", ".html", ".css", ".js"))
+
+
+def _estimator_files(estimators: Iterable[str]) -> Iterator[Path]:
+    """Python files of the packages of third-party estimators."""
+    points = {point.name: point for point in entry_points(group=GROUP)}
+    for top in sorted({points[name].module.partition(".")[0] for name in estimators} - {"fgbaseline"}):
+        spec = find_spec(top)
+        if spec is None:
+            continue
+        for folder in spec.submodule_search_locations or ():
+            yield from Path(folder).rglob("*.py")
+        if spec.submodule_search_locations is None and spec.origin is not None and Path(spec.origin).is_file():
+            yield Path(spec.origin)
+
+
+def _folder(package: str) -> Path:
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:
+        raise PackageNotFoundError(package)
+    return Path(spec.origin).parent

@@ -1,11 +1,11 @@
-"""Commands that evaluate and present: `compare`, `check`, `figures`, `bench` and `reproduce`."""
+"""Commands that evaluate and present what others have written: `compare`, `check` and `figures`."""
 
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, Numbers, choice, open_page, seed
+from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, choice, open_page, seed
 
 
 @click.command(
@@ -75,9 +75,7 @@ from .options import BODY, PATH, UNITS, XYZ, Formats, NamedFile, Numbers, choice
 )
 @click.option("--align-body", is_flag=True, help="Remove a constant rotation between the body frames.")
 @click.option(
-    "--sequence",
-    type=PATH,
-    help="The recording, or the folder of fgbaseline export: adds reprojection errors.",
+    "--sequence", type=PATH, help="The recording, or the folder of fgbaseline export: adds reprojection errors."
 )
 @click.option(
     "--landmarks",
@@ -194,7 +192,7 @@ def check(
     document = read_document(summary)  # faults of both files are reported before their models are imported
     from ..accuracy_check.command import Outputs
     from ..accuracy_check.command import check as check_measured
-    from ..accuracy_check.limits_file import read_limits
+    from ..accuracy_check.limits import read_limits
     from ..results.reader import read_measured
 
     measured, outputs = read_measured(summary, document), Outputs(junit, markdown, as_json)
@@ -237,73 +235,3 @@ def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
         save_captions({name: caption for name, (_, caption) in drawn.items()}, building)
     click.echo(f"{plural(len(drawn), 'figure')} as {', '.join(formats)} in {place}")
     return 0
-
-
-@click.command(epilog="Example: fgbaseline bench suites/quick.toml --out out/bench/quick")
-@click.argument("suite", type=PATH)
-@click.option("--out", type=PATH, help="Folder to write.  [default: out/bench/NAME]")
-@click.option(
-    "--data",
-    type=click.Path(path_type=Path, exists=True, file_okay=False),
-    help="Folder of the suite's relative paths.  [default: the suite's folder]",
-)
-@click.option("--workers", type=click.IntRange(min=1), help="Processes.  [default: one for each core]")
-@click.option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster instead (fgbaseline[cluster]).")
-@click.option("--force", is_flag=True, help="Run every job again.")
-def bench(
-    suite: Path, out: Path | None, data: Path | None, workers: int | None, scheduler: str | None, force: bool
-) -> int:
-    """Run every recording, setting and seed of SUITE.
-
-    SUITE is a TOML file. A benchmark report is written. Finished runs are kept: the same command resumes an
-    interrupted bench, and runs again only what has changed: a recording, a setting, the source code. docs/bench.md
-    describes suites and report.
-
-    Exits 0 when every estimator succeeded in every run, 1 when one failed, 2 on bad input.
-    """
-    from fgbaseline.geometry import InputError
-
-    from ..bench.command import bench as run_bench
-
-    if workers is not None and scheduler is not None:
-        raise InputError("workers: it is for this machine, and a cluster has its own; leave it out with --scheduler")
-    return run_bench(suite, out, data=data, workers=workers, scheduler=scheduler, force=force)
-
-
-@click.command(epilog="Example: fgbaseline reproduce 03.npz 10.npz --out out/reproduction")
-@click.argument("sequence", metavar="RECORDING...", nargs=-1, required=True, type=PATH)
-@click.option("--out", type=PATH, default=Path("out/reproduction"), show_default=True, help="Folder to write.")
-@click.option("--force", is_flag=True, help="Replace the folder of an earlier reproduction.")
-@click.option(
-    "--sweep-features",
-    type=Numbers("N,N,...", "whole numbers from 1 on, separated by commas", of=int),
-    default="200,400,700,1000",
-    show_default=True,
-    help="Numbers of features of the sweep.",
-)
-@click.option(
-    "--sweep-noise",
-    type=Numbers("V,V,...", "numbers above 0, separated by commas"),
-    default="0.01,1,15,100",
-    show_default=True,
-    help="Variances V of the sweep, px², of each pixel row.",
-)
-def reproduce(
-    sequence: tuple[Path, ...],
-    out: Path,
-    force: bool,
-    sweep_features: tuple[int, ...],
-    sweep_noise: tuple[float, ...],
-) -> int:
-    """Draw the source paper's figures and test its claims.
-
-    The source paper's recordings are 03.npz and 10.npz, recognized by their numbers of frames; others get figures of
-    the same kind. For a recording without features, the trajectory is drawn. The other figures use features simulated
-    along it, and say so. Each claim has the measured value, its cause, and the result on the repaired recording.
-
-    Exits 0 when the reproduction is written, whatever the claims' results, and 2 on bad input.
-    """
-    from ..reproduction.command import reproduce as run_reproduction
-    from ..reproduction.experiments import SweepSettings
-
-    return run_reproduction(sequence, out, SweepSettings(sweep_features, sweep_noise), force=force)

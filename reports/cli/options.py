@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
+from ..run.defaults import names_in
+
 PATH = click.Path(path_type=Path)
 UNITS = click.Choice(["s", "ms", "us", "ns"])
 BODY = click.Choice(["imu", "camera"])
@@ -105,18 +107,6 @@ features = click.option(
     type=FeatureCount(),
     help="Number of landmarks, those with the most observations.  [default: all; with --preset documented 1000]",
 )
-imu = click.option(
-    "--imu",
-    type=PATH,
-    metavar="CSV",
-    help="Raw inertial samples in EuRoC's form, used instead of any motion data of the input.",
-)
-imu_calibration = click.option(
-    "--imu-calibration",
-    type=PATH,
-    metavar="YAML",
-    help="Noise of these samples: EuRoC's sensor.yaml or Kalibr's imu.yaml.  [default: assumed]",
-)
 time_unit = click.option(
     "--time-unit",
     type=UNITS,
@@ -141,25 +131,19 @@ held_out = click.option(
     metavar="SHARE",
     help="Share of the tracks withheld from diagnosis and estimators, and used to rank the trajectories.",
 )
-_IMAGES = (
-    click.option("--right", type=PATH, metavar="FOLDER", help="Images: folder of the right camera."),
+_RECORDING = (
     click.option(
-        "--calibration",
+        "--imu",
+        type=PATH,
+        metavar="CSV",
+        help="Raw inertial samples in EuRoC's form, used instead of any motion data of the input.",
+    ),
+    click.option(
+        "--imu-calibration",
         type=PATH,
         metavar="YAML",
-        help="Images: calibration of folders or a bag, Kalibr or OpenCV.",
+        help="Noise of these samples: EuRoC's sensor.yaml or Kalibr's imu.yaml.  [default: assumed]",
     ),
-    click.option("--times", type=PATH, metavar="FILE", help="Images: stamps of folders, a line for each image."),
-    click.option("--topics", metavar="LEFT[,RIGHT][,IMU]", help="Images: topics of a bag.  [default: by their types]"),
-    click.option(
-        "--cameras",
-        type=click.Choice(["stereo", "left"]),
-        help="Images: a pair, or the left camera alone; run, diagnose and export then need raw inertial "
-        "samples.  [default: what there is]",
-    ),
-    click.option("--settings", type=PATH, metavar="TOML", help="Images: settings of the tracker."),
-)
-_MOTION = (
     click.option(
         "--velocities",
         type=PATH,
@@ -168,11 +152,29 @@ _MOTION = (
         "input.",
     ),
     click.option("--extrinsic", type=PATH, metavar="FILE", help="imu_T_cam of the left camera: a line of 12 numbers."),
+    click.option("--right", type=PATH, metavar="FOLDER", help="Images: folder of the right camera."),
+    click.option(
+        "--calibration", type=PATH, metavar="YAML", help="Images: calibration of folders or a bag, Kalibr or OpenCV."
+    ),
+    click.option("--times", type=PATH, metavar="FILE", help="Images: stamps of folders, a line for each image."),
+    click.option(
+        "--topics",
+        metavar="LEFT[,RIGHT][,IMU]",
+        callback=lambda _context, _option, text: names_in(text),
+        help="Images: topics of a bag.  [default: by their types]",
+    ),
+    click.option(
+        "--cameras",
+        type=click.Choice(["stereo", "left"]),
+        help="Images: a pair, or the left camera alone; run, diagnose and export then need raw inertial "
+        "samples.  [default: what there is]",
+    ),
+    click.option("--settings", "tracker", type=PATH, metavar="TOML", help="Images: settings of the tracker."),
 )
 
 
-def images(command: Command) -> Command:
+def recorded(command: Command) -> Command:
     """The options of recordings of images, and of motion given beside them."""
-    for option in reversed((*_MOTION, *_IMAGES)):
+    for option in reversed(_RECORDING):
         command = option(command)
     return command

@@ -1,4 +1,4 @@
-"""Commands on a recording: `run`, `track`, `diagnose`, `export`, `simulate`; `estimators` lists what can run on it."""
+"""Commands on a recording: `run`, `track`, `diagnose` and `export`; `estimators` lists what can run on it."""
 
 from pathlib import Path
 from typing import Any
@@ -7,12 +7,7 @@ import click
 
 from ..run.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
 from . import options
-from .options import PATH, Numbers
-
-PATHS = ("town", "loop", "highway", "handheld", "drone", "along")
-CAMERAS = ("stereo", "left")
-INTERVALS = ("after", "before", "mean")
-DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "accelerometer_walk")
+from .options import PATH
 
 
 @click.command(epilog="Example: fgbaseline run drive.npz --truth poses.txt --truth-frame camera --out out/drive")
@@ -65,9 +60,7 @@ DENSITIES = ("gyroscope_density", "gyroscope_walk", "accelerometer_density", "ac
     "'# up x y z', else 0,0,1 if the inertial samples agree within 0.5°, else the direction that they measure]",
 )
 @options.as_recorded
-@options.imu
-@options.imu_calibration
-@options.images
+@options.recorded
 @options.time_unit
 @options.repairs
 @options.held_out
@@ -88,8 +81,6 @@ def run(
     landmarks: str,
     time_unit: str | None,
     rerun_file: Path | None,
-    topics: str | None,
-    settings: Path | None,
     **given: Any,
 ) -> int:
     """Run estimators on RECORDING, compare them and write a report.
@@ -116,8 +107,6 @@ def run(
         functions=functions,
         landmarks=LandmarkMode(landmarks),
         time_unit=None if time_unit is None else TimeUnit(time_unit),
-        topics=names_in(topics),
-        tracker=settings,
         **given,
     )
     return run_and_report(chosen, out, force=force, rerun_file=rerun_file, opened=opened)
@@ -127,10 +116,8 @@ def run(
 @click.argument("source", metavar="INPUT", type=PATH)
 @click.option("--out", type=PATH, required=True, help="Npz to write.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
-@options.imu
-@options.imu_calibration
-@options.images
-def track(source: Path, out: Path, force: bool, settings: Path | None, topics: str | None, **given: Any) -> int:
+@options.recorded
+def track(source: Path, out: Path, force: bool, tracker: Path | None, **given: Any) -> int:
     """Track the images in INPUT and write their tracks.
 
     INPUT is a EuRoC, TUM-VI or KITTI folder, a folder of images (with --right for a pair), or a ROS bag.
@@ -143,7 +130,7 @@ def track(source: Path, out: Path, force: bool, settings: Path | None, topics: s
 
     from ..run.images import write_tracks
 
-    return write_tracks(source, out, ImageOptions(topics=names_in(topics), **given), settings, force=force)
+    return write_tracks(source, out, ImageOptions(**given), tracker, force=force)
 
 
 @click.command(epilog="Example: fgbaseline estimators")
@@ -169,9 +156,7 @@ def estimators() -> None:
 @click.option("--out", type=PATH, help="Folder for diagnosis.json, figures and page.")
 @click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json alone on standard output.")
 @click.option("--write-repairs", type=PATH, help="TOML file of the repairs, to edit and to use with run --repairs.")
-@options.imu
-@options.imu_calibration
-@options.images
+@options.recorded
 @options.time_unit
 @click.option("--force", is_flag=True, help="Replace the folder, or the repairs, of an earlier diagnosis.")
 @options.open_page
@@ -183,8 +168,6 @@ def diagnose(
     time_unit: str | None,
     force: bool,
     opened: bool,
-    topics: str | None,
-    settings: Path | None,
     **given: Any,
 ) -> int:
     """Detect the faults of RECORDING and estimate its noise.
@@ -201,8 +184,7 @@ def diagnose(
     from ..run.settings import RunSettings
 
     unit = None if time_unit is None else TimeUnit(time_unit)
-    chosen = RunSettings(sequence=sequence, time_unit=unit, topics=names_in(topics), tracker=settings, **given)
-    recording = read_sequence(chosen)
+    recording = read_sequence(RunSettings(sequence=sequence, time_unit=unit, **given))
     return print_diagnosis(recording, out, as_json=as_json, repairs=write_repairs, force=force, opened=opened)
 
 
@@ -212,14 +194,12 @@ def diagnose(
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier export.")
 @options.preset
 @options.features
-@options.imu
-@options.imu_calibration
-@options.images
+@options.recorded
 @options.as_recorded
 @options.repairs
 @options.held_out
 @options.seed("the choice of held-out tracks")
-def export(out: Path, force: bool, topics: str | None, settings: Path | None, **given: Any) -> int:
+def export(out: Path, force: bool, **given: Any) -> int:
     """Write the problem that run solves on RECORDING.
 
     The npz, CSV and JSON files hold repaired velocities, increments with covariances, observations with the mask,
@@ -231,113 +211,4 @@ def export(out: Path, force: bool, topics: str | None, settings: Path | None, **
     from ..run.command import export as export_problem
     from ..run.settings import RunSettings
 
-    chosen = RunSettings(topics=names_in(topics), tracker=settings, **given)
-    return export_problem(chosen, out, force=force)
-
-
-@click.command(epilog="Example: fgbaseline simulate drive.npz --path loop --duration 120 --burst 20:22:0.5 --seed 7")
-@click.argument("output", type=PATH)
-@click.option("--path", help="Shape of the drive.  [default: town]", type=click.Choice(PATHS))
-@click.option("--along", help="Recording whose velocities are the motion (path 'along').", type=PATH)
-@click.option(
-    "--along-gyro-bias", help="rad/s, first subtracted from the rates of --along.", type=(float, float, float)
-)
-@click.option("--duration", help="Seconds.  [default: 60, or all of --along]", type=float)
-@click.option("--frame-rate", help="Frames a second.  [default: 10]", type=float)
-@click.option("--seed", help="The same seed gives the same bytes.  [default: 0]", type=int)
-@click.option("--standing", help="Seconds at rest before the motion starts.  [default: 0]", type=float)
-@click.option("--imu", is_flag=True, help="Raw inertial samples in place of body velocities.")
-@click.option(
-    "--cameras", help="Both cameras, or the left one alone with --imu.  [default: stereo]", type=click.Choice(CAMERAS)
-)
-@click.option("--imu-rate", help="Hz, with --imu.  [default: 200]", type=float)
-@click.option(
-    "--imu-noise",
-    help="With --imu: noise density and random walk of the gyroscope, then of the accelerometer (continuous time).  "
-    "[default: 1.7e-4 2e-5 2e-3 3e-3]",
-    type=(float, float, float, float),
-)
-@click.option("--accelerometer-bias", help="m/s^2, with --imu.", type=(float, float, float))
-@click.option("--sigma-linear", help="m/s, 1-sigma noise of a linear velocity sample.  [default: 0.1]", type=float)
-@click.option(
-    "--sigma-angular", help="rad/s, 1-sigma noise of an angular velocity sample.  [default: 0.01]", type=float
-)
-@click.option("--gyro-bias", help="rad/s, in recorded axes.", type=(float, float, float))
-@click.option("--velocity-scale", help="Recorded over true velocity.  [default: 1]", type=float)
-@click.option("--time-offset", help="s: a velocity stamped t was measured at t + offset.  [default: 0]", type=float)
-@click.option(
-    "--velocity-of-interval",
-    help="Interval that a velocity belongs to: after or before its frame, or the mean of both.  [default: after]",
-    type=click.Choice(INTERVALS),
-)
-@click.option("--linear-axes", help="Axis convention of the linear velocity, such as x,-y,-z.")
-@click.option("--angular-axes", help="Axis convention of the angular velocity.")
-@click.option("--features-per-frame", help="Number of tracks in a frame.  [default: 70]", type=float)
-@click.option("--track-length", help="Median length of a track, frames.  [default: 14]", type=float)
-@click.option("--returning-share", help="Share of tracks that are lost and found again.", type=float)
-@click.option("--return-after", help="s from the first observation of such a track to its return.", type=float)
-@click.option("--sigma-pixel", help="px, 1-sigma noise of each pixel row.  [default: 0.5]", type=float)
-@click.option("--row-correlation", help="Correlation of the noise of vL and vR.  [default: 0]", type=float)
-@click.option("--wrong-share", help="Share of wrong matches.  [default: 0.03]", type=float)
-@click.option(
-    "--burst",
-    help="Share of wrong matches between two times, s; repeatable.",
-    type=Numbers("START:END:SHARE", "START:END:SHARE in numbers"),
-    multiple=True,
-)
-@click.option(
-    "--blackout",
-    help="Time without features, s; repeatable.",
-    type=Numbers("START:END", "START:END in numbers"),
-    multiple=True,
-)
-@click.option("--moving-share", help="Share of observations on moving objects.", type=float)
-@click.option("--force", is_flag=True, help="Replace an existing file.")
-def simulate(
-    output: Path,
-    along: Path | None,
-    force: bool,
-    imu: bool,
-    imu_rate: float | None,
-    imu_noise: tuple[float, float, float, float] | None,
-    accelerometer_bias: tuple[float, float, float] | None,
-    **given: Any,
-) -> None:
-    """Simulate a recording with its ground truth.
-
-    OUTPUT is an npz file. It has the arrays of docs/formats.md, with `ground_truth` and `landmarks`; `fgbaseline run`
-    reads it.
-
-    Exits 0, or 2 on bad input.
-    """
-    from fgbaseline.data import read, write_npz
-    from fgbaseline.data.formats.atomic_write import require_new
-    from fgbaseline.data.simulate import SimulatedImu, Simulation
-    from fgbaseline.data.simulate import simulate as simulated
-    from fgbaseline.data.wording import plural
-    from fgbaseline.geometry import InputError
-
-    if output.suffix != ".npz":
-        raise InputError(f"{output}: a recording is written as .npz; give a name that ends with it")
-    require_new(output, force=force)
-    settings = {name: value for name, value in given.items() if value not in (None, ())}
-    for many, one in (("bursts", "burst"), ("blackouts", "blackout")):
-        if one in settings:
-            settings[many] = settings.pop(one)
-    inertial: dict[str, Any] = {"rate": imu_rate, "accelerometer_bias": accelerometer_bias}
-    if imu_noise is not None:
-        inertial |= dict(zip(DENSITIES, imu_noise, strict=True))
-    inertial = {name: value for name, value in inertial.items() if value is not None}
-    if inertial and not imu:
-        raise InputError("imu-rate, imu-noise, accelerometer-bias: they are settings of --imu; add it")
-    if imu:
-        settings["imu"] = SimulatedImu(**inertial)
-    if along is not None:
-        settings["along"] = read(along)
-        settings.setdefault("path", "along")
-    sequence = simulated(Simulation(**settings))
-    write_npz(sequence, output, force=force)
-    click.echo(
-        f"{output}: {plural(sequence.n_frames, 'frame')}, {plural(len(sequence.observations), 'observation')} of "
-        f"{plural(sequence.n_landmarks, 'track')}"
-    )
+    return export_problem(RunSettings(**given), out, force=force)

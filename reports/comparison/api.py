@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
-from fgbaseline.data.formats.file_errors import FilePath
+from fgbaseline.data.formats.file_errors import FilePath, as_path
+from fgbaseline.data.formats.trajectory_opening import open_named
 from fgbaseline.geometry import InputError
 
 from ..python_interface import for_python
-from .opening import as_path, with_open_file
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Run
@@ -95,37 +95,12 @@ def compare_trajectories(
 
     Raises InputError, in one sentence, for an invalid trajectory or keyword. No argument is changed.
     """
+    options = {name: value for name, value in locals().items() if name not in ("reference", "estimates")}
     from .sources import ARRAYS, by_name, opened
 
     every = [opened(each, form, name) for name, each in by_name(estimates)]
     first = opened(reference, form, "reference") if isinstance(reference, ARRAYS) else reference
-    return compare(
-        first,
-        *every,
-        align=align,
-        align_first=align_first,
-        up=up,
-        association=association,
-        tolerance=tolerance,
-        offset=offset,
-        search_offset=search_offset,
-        deltas=deltas,
-        all_pairs=all_pairs,
-        form=form,
-        times=times,
-        time_unit=time_unit,
-        quaternion=quaternion,
-        lever_arm=lever_arm,
-        align_body=align_body,
-        sequence=sequence,
-        landmarks=landmarks,
-        held_out=held_out,
-        reference_body=reference_body,
-        estimate_body=estimate_body,
-        extrinsic=extrinsic,
-        beside=beside,
-        seed=seed,
-    )
+    return compare(first, *every, **options)
 
 
 def compare(
@@ -150,9 +125,13 @@ def compare(
     options["times"] = tuple(map(as_path, times))
     options |= {name: as_path(options[name]) for name in FILES if name in options}
     settings = Settings(**options, deltas=tuple(Delta.parse(text) for text in deltas))
+
+    def opened(given: Any) -> Any:
+        return open_named(given, settings.form) if isinstance(given, str | os.PathLike) else given
+
     is_folder = isinstance(reference, str | os.PathLike) and Path(reference).is_dir()
-    first = reference if is_folder else with_open_file(reference, settings)
-    others = [with_open_file(each, settings) for each in estimates]
+    first = reference if is_folder else opened(reference)
+    others = [opened(each) for each in estimates]
     of_them = landmarks if isinstance(landmarks, Mapping) else list(landmarks)
     from .report import report_of
 

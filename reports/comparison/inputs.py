@@ -3,8 +3,9 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain, count
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias, cast, get_args
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 import numpy as np
 
@@ -14,18 +15,17 @@ from fgbaseline.compare.trajectory_comparison.body_frames import (
     with_length_unit_recognized,
     with_lever_arm,
 )
-from fgbaseline.compare.trajectory_comparison.conventions import Resolved, Source, resolve
+from fgbaseline.compare.trajectory_comparison.conventions import Source, resolve
 from fgbaseline.compare.trajectory_comparison.inputs import Entries, Entry
 from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
 from fgbaseline.data import Trajectory
 from fgbaseline.data.formats import ParsedTrajectory, read_landmarks, read_times
 from fgbaseline.data.formats.file_errors import FilePath
 from fgbaseline.data.formats.kitti import read_extrinsic
-from fgbaseline.data.formats.trajectory_opening import OpenedTrajectory
+from fgbaseline.data.formats.trajectory_opening import OpenedTrajectory, split_name
 from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ..run.defaults import names_in
-from .opening import split_name
 from .sources import TrajectoryLike, opened
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ Given: TypeAlias = TrajectoryLike | Source | OpenedTrajectory
 GivenLandmarks: TypeAlias = "Sequence[FilePath] | Mapping[str, FilePath | Landmarks]"
 """`[NAME=]FILE` each, or landmarks by the name of their trajectory"""
 
-NO_RUN = (*get_args(OpenedTrajectory), ParsedTrajectory, Trajectory)
+NO_RUN = OpenedTrajectory | ParsedTrajectory | Trajectory
 """types of a reference that is known to be no run before the model of runs is imported"""
 
 CUT_OFF = 0.01
@@ -56,7 +56,7 @@ def read_entries(
     run, problem, held = _background(reference, settings)
     own = opened(cast("Given", reference), settings.form) if run is None else run.trajectory(run.reference)
     sources = [own, *(opened(given, settings.form) for given in estimates)]
-    first, *others = in_one_body(resolve(sources, frame_times(settings, problem), settings), settings, problem, run)
+    first, *others = in_one_body(sources, settings, problem, run)
     beside = []
     if run is not None:
         first = replace(first, landmarks=run.landmarks(run.reference), trust=run.trust)
@@ -84,30 +84,32 @@ def _background(
 
     from .reference_run import load_problem, read_reference_run, reference_in_memory
 
+    run: ReferenceRun | None = None
     if isinstance(reference, Run):
-        run: ReferenceRun | None = reference_in_memory(reference)
+        run = reference_in_memory(reference)
     elif isinstance(reference, str | os.PathLike) and Path(reference).is_dir():
         run = read_reference_run(Path(reference))
-    else:
-        run = None
     return run, *load_problem(settings, run)
 
 
 def in_one_body(
-    every: list[Resolved], settings: Settings, problem: "Problem | None", run: "ReferenceRun | None"
+    sources: Sequence[Source], settings: Settings, problem: "Problem | None", run: "ReferenceRun | None" = None
 ) -> list[Entry]:
-    """Entries with the poses of one body: the IMU, or the point that a reference of positions follows."""
-    times, imu_T_cam = frame_times(settings, problem), _extrinsic(settings, problem)
+    """Entries, the reference first, with the poses of one body: the IMU, or the point of a reference of positions.
+
+    Raises InputError for time units that nothing decides, and for an extrinsic that is needed and not known.
+    """
+    times, imu_T_cam = _frame_times(settings, problem), _extrinsic(settings, problem)
     reference, *estimates = [
         Entry(each.trajectory(times), each.landmarks, each.covariance, each.up, each.up_stated, each.remarks)
-        for each in every
+        for each in resolve(sources, times, settings)
     ]
     bodies: tuple[Body, Body] = ("imu" if run else settings.reference_body, settings.estimate_body)
-    if settings.lever_arm is not None and bodies[0] != bodies[1]:
-        raise InputError(
-            "lever-arm: it already ends at the reference's point; leave out --reference-body and --estimate-body"
-        )
     if settings.lever_arm is not None:
+        if bodies[0] != bodies[1]:
+            raise InputError(
+                "lever-arm: it already ends at the reference's point; leave out --reference-body and --estimate-body"
+            )
         estimates = [with_lever_arm(each, np.array(settings.lever_arm)) for each in estimates]
     elif not reference.trajectory.oriented and bodies[0] != bodies[1]:
         imu_T_cam = _required(imu_T_cam, reference)
@@ -130,7 +132,7 @@ def _required(imu_T_cam: FloatArray | None, entry: Entry) -> FloatArray:
     return imu_T_cam
 
 
-def frame_times(settings: Settings, problem: "Problem | None") -> list[FloatArray]:
+def _frame_times(settings: Settings, problem: "Problem | None") -> list[FloatArray]:
     """Stamps, s, for files without them: of --times, else of the recording, whose last few may be missing."""
     if settings.times:
         given = settings.times
@@ -156,27 +158,21 @@ def _beside(run: "ReferenceRun", wanted: str) -> list[str]:
     if wanted in ("all", "none"):
         return others if wanted == "all" else []
     names = list(names_in(wanted))
-    for name in names:
-        if name not in others:
-            raise InputError(f"beside: the run has no '{name}' besides its reference; it has {', '.join(others)}")
+    if unknown := next((name for name in names if name not in others), None):
+        raise InputError(f"beside: the run has no '{unknown}' besides its reference; it has {', '.join(others)}")
     return names
 
 
 def _named_apart(entries: list[Entry]) -> list[Entry]:
     """Entries with unique names: equal names get the folder's name in front, then a number at the end."""
     given = [entry.name for entry in entries]
-    names = list(given)
-    for i, entry in enumerate(entries):
-        if given.count(entry.name) > 1 and Path(entry.trajectory.source).parent.name:
-            names[i] = f"{Path(entry.trajectory.source).parent.name}-{entry.name}"
-    taken: set[str] = set()
-    for i, name in enumerate(names):
-        names[i] = next(n for n in (name, *(f"{name}-{k}" for k in range(2, len(names) + 2))) if n not in taken)
-        taken.add(names[i])
-    return [
-        replace(e, trajectory=replace(e.trajectory, name=valid_file_name(n)))
-        for e, n in zip(entries, names, strict=True)
-    ]
+    named: dict[str, Entry] = {}
+    for entry in entries:
+        folder = Path(entry.trajectory.source).parent.name
+        name = f"{folder}-{entry.name}" if given.count(entry.name) > 1 and folder else entry.name
+        unique = next(n for n in chain((name,), (f"{name}-{k}" for k in count(2))) if n not in named)
+        named[unique] = replace(entry, trajectory=replace(entry.trajectory, name=valid_file_name(unique)))
+    return list(named.values())
 
 
 def valid_file_name(name: str) -> str:

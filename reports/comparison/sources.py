@@ -11,17 +11,9 @@ from fgbaseline.compare.trajectory_comparison.conventions import Source
 from fgbaseline.data import Estimate, Landmarks, Status, Trajectory, Truth
 from fgbaseline.data.formats import ParsedTrajectory, TrajectoryFormat
 from fgbaseline.data.formats.file_errors import FilePath
-from fgbaseline.data.formats.trajectory_opening import (
-    OpenedTrajectory,
-    TrajectoryArchive,
-    TrajectoryText,
-    TrajectoryTopic,
-    open_trajectory,
-)
+from fgbaseline.data.formats.trajectory_opening import OpenedTrajectory, open_named, open_trajectory
 from fgbaseline.data.formats.trajectory_reader import parsed_file
 from fgbaseline.geometry import InputError
-
-from .opening import split_name
 
 Array: TypeAlias = NDArray[Any]
 TrajectoryLike: TypeAlias = FilePath | Trajectory | Estimate | Truth | Array | tuple[Array, Array]
@@ -46,9 +38,8 @@ def opened(
 ) -> Source:
     """Trajectory by a name, by default its own, as far as it is known without the others. Raises InputError."""
     if isinstance(given, str | os.PathLike):
-        own, file = (name, os.fspath(given)) if name else split_name(os.fspath(given))
-        return parsed_file(open_trajectory(file, form, own))
-    if isinstance(given, TrajectoryText | TrajectoryArchive | TrajectoryTopic):
+        return parsed_file(open_trajectory(given, form, name) if name else open_named(given, form))
+    if isinstance(given, OpenedTrajectory):
         return parsed_file(given)
     if isinstance(given, ParsedTrajectory):
         return given

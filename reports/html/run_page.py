@@ -12,8 +12,7 @@ from fgbaseline.data.wording import capitalized
 from ..figures import EncodedFigure
 from ..figures.palette import colors
 from ..formatting import counted, number
-from ..phrases.run import verdict
-from ..phrases.tracks import track_sentences
+from ..phrases.run import track_sentences, verdict
 from ..tables import run as tables
 from ..tables import run_details as details
 from .page import (

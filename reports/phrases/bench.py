@@ -74,25 +74,21 @@ def _best(results: Results) -> list[str]:
         reference = results.references.get(case)
         unranked = frozenset(SAME_GRAPH) - {reference} if reference in SAME_GRAPH else frozenset()
         text.append(winner(case, table[table["metric"] == metric.name], metric, unranked))
-    without = [case for case in results.cases if case not in of_case]
-    return (
-        [*text, f"Not ranked by accuracy, without ground truth and held-out tracks: {listed(without)}."]
-        if without
-        else text
-    )
+    if without := [case for case in results.cases if case not in of_case]:
+        text.append(f"Not ranked by accuracy, without ground truth and held-out tracks: {listed(without)}.")
+    return text
 
 
 def winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset[str]) -> str:
-    """The smallest mean error among those that answered in every run, where the paired interval separates it.
+    """The smallest mean error among those that answered in every run, where it is not `tied` with another.
 
     Other minima of the reference's graph do not compete with it.
     """
     rows = [row for row in records(ranked) if row["estimator"] not in unranked] or records(ranked)
     most = max(row["runs"] for row in rows)
     first, *others = (row for row in rows if row["runs"] == most)
-    figures = {
-        row["estimator"]: f"{interval(row['mean'], row['low'], row['high'])} {metric.unit}".rstrip() for row in rows
-    }
+    unit = f" {metric.unit}".rstrip()
+    figures = {row["estimator"]: f"{interval(row['mean'], row['low'], row['high'])}{unit}" for row in rows}
     fewer = [f"{row['estimator']} ({_answers(row, first, most, metric)})" for row in rows if row["runs"] < most]
     left_out = f"; not ranked for failed runs: {listed(fewer)}" if fewer else ""
     if not others:
@@ -100,16 +96,12 @@ def winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset[
     if most == 1:
         each = listed(f"{figures[row['estimator']]} for {row['estimator']}" for row in (first, *others))
         return f"{case}: {metric.short} {each}; one run does not rank them{left_out}."
-    best = number(first["mean"])
-    tied = [row["estimator"] for row in others if row["tied"] or number(row["mean"]) == best]
-    smallest = f"{first['estimator']} {figures[first['estimator']]} over {most} runs"
-    if tied:
-        text = f"{case}: {metric.short} {smallest}; no significant difference from {listed(tied)}"
-    else:
-        text = f"{case}: smallest {metric.short} {smallest}"
-    apart = [f"{row['estimator']} {figures[row['estimator']]}" for row in others if row["estimator"] not in tied]
+    tied = [row["estimator"] for row in others if row["tied"]]
+    apart = [f"{row['estimator']} {figures[row['estimator']]}" for row in others if not row["tied"]]
+    title = f"{case}: {'' if tied else 'smallest '}{metric.short}"
+    like = f"; no significant difference from {listed(tied)}" if tied else ""
     larger = f"; larger, by the paired interval: {listed(apart)}" if apart else ""
-    return f"{text}{larger}{left_out}."
+    return f"{title} {first['estimator']} {figures[first['estimator']]} over {most} runs{like}{larger}{left_out}."
 
 
 def _answers(row: dict[str, Any], first: dict[str, Any], most: int, metric: Metric) -> str:
@@ -127,9 +119,7 @@ def _overall(results: Results) -> list[str]:
         return []
     table = table[table["metric"] == metric.name].head(3)
     places = [f"{row['estimator']} {number(row['mean_rank'])}" for row in records(table)]
-    if not places:
-        return []
-    return [f"Mean rank by {metric.short} over {table['cases'].max()} cases: {listed(places)}."]
+    return [] if not places else [f"Mean rank by {metric.short} over {table['cases'].max()} cases: {listed(places)}."]
 
 
 def _consistency(results: Results) -> list[str]:
@@ -142,3 +132,10 @@ def _consistency(results: Results) -> list[str]:
         low, high = (number(float(of_case[side].iloc[0])) for side in ("low", "high"))
         text.append(f"{case}: ANEES {listed(figures)}; 95 % bounds {low} to {high}.")
     return text if len(text) <= MOST_CASES else []
+
+
+def duration(seconds: float) -> str:
+    """Duration as text: `3.2 s`, `12 min` or `3.4 h`."""
+    if seconds < 100.0:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60.0:.2g} min" if seconds < 6000.0 else f"{seconds / 3600.0:.2g} h"

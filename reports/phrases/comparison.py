@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, is_insufficient
+from fgbaseline.compare.overconfidence import DEGREES_OF_FREEDOM
 from fgbaseline.compare.trajectory.alignment import SCALE
 from fgbaseline.compare.trajectory_comparison.comparison import ASSUMED_UP, Comparison
 from fgbaseline.compare.trajectory_comparison.computation import TILT
@@ -12,13 +13,16 @@ from fgbaseline.compare.trajectory_comparison.sample_sizes import samples
 
 from ..formatting import counted, grouped, listed, number, per_cent
 from .evidence import (
-    DEGREES_OF_FREEDOM,
+    error_decompositions,
+    file_resolution,
     held_out_sentences,
-    overconfidence_bound,
+    in_pixels,
+    maximum_errors,
+    path_lengths,
+    position_rmse,
     reference_sentence,
     sample_requirement,
 )
-from .position_errors import error_decompositions, file_resolution, maximum_errors, path_lengths, position_rmse
 
 
 def caption(comparison: Comparison) -> str:
@@ -156,36 +160,30 @@ def _undetermined_alignments(comparison: Comparison) -> list[str]:
 def _rough_intervals(comparison: Comparison) -> list[str]:
     """Estimates with fewer than ten independent blocks."""
     names = [r.name for r in comparison.results.values() if not r.statistics["translation"].reliable]
-    if not names:
-        return []
-    return [f"The 95 % intervals of {listed(names)} are rough, from fewer than 10 independent blocks."]
+    rough = "are rough, from fewer than 10 independent blocks"
+    return [f"The 95 % intervals of {listed(names)} {rough}."] if names else []
 
 
 def _reported_covariances(comparison: Comparison) -> list[str]:
     """Consistency of the covariances in the files of estimates, the overconfident ones first."""
-    sentences, measured, remarks, bad = [], dict[str, float](), dict[str, str](), []
+    sentences, measured, bad = [], list[tuple[bool, str]](), []
     for result in comparison.results.values():
         reported = result.reported_covariance
         if reported is None:
             if result.entry.covariance is not None:
                 sentences.append(f"The covariances of {result.name} are not evaluated: {result.notes['nees']}.")
             continue
-        known = reported.nees[~np.isnan(reported.nees)]
-        if len(known):
-            measured[result.name] = float(np.mean(known))
-            remark = f"; {reported.remark}" if reported.remark else ""
-            remarks[result.name] = f"over {counted(len(known), 'pose')}{remark}"
+        if n := len(reported.known):
+            mean, remark = float(np.mean(reported.known)), f"; {reported.remark}" if reported.remark else ""
+            root = number(float(np.sqrt(mean / DEGREES_OF_FREEDOM)))
+            text = f"{result.name} {root} (NEES {number(mean)} over {counted(n, 'pose')}{remark})"
+            measured.append((reported.is_overconfident, text))
         if reported.not_positive_definite:
-            n = number(reported.not_positive_definite)
-            bad.append(f"{n} of the {counted(len(reported.nees), 'covariance')} of {result.name}")
-    each = {
-        name: f"{name} {number(float(np.sqrt(mean / DEGREES_OF_FREEDOM)))} (NEES {number(mean)} {remarks[name]})"
-        for name, mean in measured.items()
-    }
-    for word, is_over in (("Overconfident", True), ("Not overconfident", False)):
-        if those := [each[name] for name, mean in measured.items() if (mean > overconfidence_bound()) is is_over]:
-            by = f"the normalized error RMS (root of the mean NEES / {DEGREES_OF_FREEDOM}, expected 1)"
-            sentences.append(f"{word}, by {by}: {listed(those)}.")
+            those = f"{number(reported.not_positive_definite)} of the {counted(len(reported.nees), 'covariance')}"
+            bad.append(f"{those} of {result.name}")
+    by = f"by the normalized error RMS (root of the mean NEES / {DEGREES_OF_FREEDOM}, expected 1)"
+    for is_overconfident, each in sorted(grouped(measured).items(), reverse=True):
+        sentences.append(f"{'Overconfident' if is_overconfident else 'Not overconfident'}, {by}: {listed(each)}.")
     if bad:
         sentences.append(f"Not positive definite, and left out by NEES: {listed(bad)}.")
     return sentences
@@ -203,23 +201,20 @@ def _reprojection(comparison: Comparison) -> list[str]:
     medians = {name: float(table["error"].median()) for name, table in tables.items() if table is not None}
     if len(medians) < 2:
         return []
-    each = listed(f"{number(medians[name])} px for {name}" for name in sorted(medians, key=lambda name: medians[name]))
     return [
-        f"Median reprojection error, landmarks triangulated along each trajectory: {each}.",
+        f"Median reprojection error, landmarks triangulated along each trajectory: {in_pixels(medians)}.",
         "This error measures the motion over the length of a track, not drift.",
     ]
 
 
 def _maps(comparison: Comparison) -> list[str]:
-    known = {name: result.map for name, result in comparison.results.items() if result.map is not None}
-    if not known:
-        return []
-    each = listed(
+    each = [
         f"{number(float(table['distance'].median()))} m for {name} ({number(float(table['seen'].median()))} m in the "
         f"camera frame; {counted(len(table), 'common landmark')})"
-        for name, table in known.items()
-    )
-    return [f"Map difference from {comparison.reference.name} (median): {each}."]
+        for name, result in comparison.results.items()
+        if (table := result.map) is not None
+    ]
+    return [f"Map difference from {comparison.reference.name} (median): {listed(each)}."] if each else []
 
 
 def _held_out(comparison: Comparison) -> list[str]:

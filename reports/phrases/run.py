@@ -1,4 +1,4 @@
-"""Sentences at the top of a run's page and on the terminal: one fact each, with its number and threshold."""
+"""Sentences on a run: those at the top of its page and on the terminal, one fact each, and those on its tracks."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,6 +15,7 @@ from fgbaseline.compare import (
 )
 from fgbaseline.compare.divergence_onset import (
     AROUND,
+    DivergenceOnset,
     divergence_onset,
     divergence_threshold,
     mask_share,
@@ -22,15 +23,18 @@ from fgbaseline.compare.divergence_onset import (
     wrong_share,
 )
 from fgbaseline.compare.estimate_comparison import Run, known, same_frames
+from fgbaseline.compare.overconfidence import DEGREES_OF_FREEDOM
+from fgbaseline.compare.residuals.residual_classes import REGION_COLUMNS, REGION_ROWS
 from fgbaseline.compare.sample_sizes import insufficient_truth, truth_sample
-from fgbaseline.data import Status
+from fgbaseline.data import Sequence, Status
 from fgbaseline.data.wording import noun
+from fgbaseline.geometry import FloatArray
 
-from ..formatting import counted, distance, grouped, listed, number, per_cent
+from ..formatting import counted, distance, grouped, limit_per_cent, listed, number, per_cent
 from ..results.evidence import frame_ranges, summarize_sigma
 from .evidence import (
-    DEGREES_OF_FREEDOM,
     held_out_sentences,
+    in_pixels,
     reference_sentence,
     reference_sigma_sentence,
     sample_requirement,
@@ -42,6 +46,8 @@ SUSPECTED = "wrong matches, moving points or points that cannot be triangulated"
 """reasons of `WRONG_MATCH`"""
 LONGEST_LIST = 80
 """letters of a list of frames; of a longer one only the first and the last frame are named"""
+SPARSE = 0.25
+"""part of an even share of the observations, below which a cell of the 3 x 3 grid is sparse"""
 
 
 def verdict(run: Run) -> list[str]:
@@ -107,37 +113,31 @@ def _coverage(run: Run) -> list[str]:
     common = {name: run.results[name].divergence_common for name in frames}
     counts = {c.frames for c in common.values() if c is not None}
     unranked = [name for name, c in common.items() if c is None]
-    sentences = [f"The estimators cover different shares of the recording's time: {each}."]
+    shares = f"The estimators cover different shares of the recording's time: {each}."
     if not counts:
-        return [*sentences, "They are not ranked: they have no frame in common."]
+        return [shares, "They are not ranked: they have no frame in common."]
     having = "the others have" if unranked else "all have"
-    sentences.append(f"They are ranked over the {counted(counts.pop(), 'frame')} that {having}.")
-    if unranked:
-        sentences.append(f"{listed(unranked)} {'is' if len(unranked) == 1 else 'are'} not ranked.")
-    return sentences
+    ranked = f"They are ranked over the {counted(counts.pop(), 'frame')} that {having}."
+    left_out = [f"{listed(unranked)} {noun(len(unranked), 'is', 'are')} not ranked."] if unranked else []
+    return [shares, ranked, *left_out]
 
 
 def _maximum_divergence(run: Run) -> list[str]:
     """Largest divergence of each estimator, and from when on it exceeds the threshold, the first one first."""
-    not_compared = run.by_products | run.same_graph
-    rivals = [
-        r for r in run.compared if r.divergence is not None and r.name not in not_compared and known(r.divergence).any()
-    ]
-    onsets = {r.name: onset for r in rivals if (onset := divergence_onset(run, r)) is not None}
+    most, onsets = dict[str, tuple[float, str]](), dict[str, DivergenceOnset]()
+    for r in run.compared:
+        if r.divergence is None or r.name in run.by_products | run.same_graph or not known(r.divergence).any():
+            continue
+        most[r.name] = (divergence_threshold(r), distance(divergence_summary(r.divergence)["max"]))
+        if (onset := divergence_onset(run, r)) is not None:
+            onsets[r.name] = onset
     found = dict(sorted(onsets.items(), key=lambda item: item[1].frame))
-    sentences = threshold_sentences(
-        "divergence",
-        {
-            r.name: (divergence_threshold(r), distance(divergence_summary(r.divergence)["max"]))
-            for r in rivals
-            if r.divergence is not None
-        },
-        {
-            name: ("" if onset.beyond == 1.0 else f"in {per_cent(onset.beyond)} of the frames ")
-            + f"from {onset.seconds:.1f} s (frame {onset.frame}) on"
-            for name, onset in found.items()
-        },
-    )
+    since = {
+        name: ("" if onset.beyond == 1.0 else f"in {per_cent(onset.beyond)} of the frames ")
+        + f"from {onset.seconds:.1f} s (frame {onset.frame}) on"
+        for name, onset in found.items()
+    }
+    sentences = threshold_sentences("divergence", most, since)
     overall = wrong_share(run.problem, np.ones(run.problem.n_frames, dtype=np.bool_))
     wrong = {name: onset.wrong for name, onset in found.items() if onset.wrong is not None}
     if wrong and overall is not None:
@@ -160,7 +160,7 @@ def _with_status(status: Status, run: Run) -> list[str]:
 def _missing_poses(run: Run) -> list[str]:
     names = grouped((int(np.isnan(r.estimate.world_T_imu[:, 0, 0]).sum()), r.name) for r in run.answered)
     return [
-        f"{listed(those)} {'has' if len(those) == 1 else 'have'} no pose in {missing} of "
+        f"{listed(those)} {noun(len(those), 'has', 'have')} no pose in {missing} of "
         f"{counted(run.problem.n_frames, 'frame')}."
         for missing, those in names.items()
         if missing
@@ -185,12 +185,11 @@ def _invalid_covariances(run: Run) -> list[str]:
     for result in run.answered:
         bad = np.flatnonzero(result.evidence.covariance == CovarianceState.NOT_POSITIVE_DEFINITE)
         if len(bad):
-            where = frame_ranges(bad)
-            if len(where) > LONGEST_LIST:
-                where = f"first {bad[0]}, last {bad[-1]}"
-            found.append(((len(bad), f"{noun(len(bad), 'frame')} {where}"), result.name))
+            ranges = frame_ranges(bad)
+            where = ranges if len(ranges) <= LONGEST_LIST else f"first {bad[0]}, last {bad[-1]}"
+            found.append(((len(bad), where), result.name))
     each = [
-        f"{number(n)} {f'of {names[0]}' if len(names) == 1 else f'each of {listed(names)}'} ({where})"
+        f"{number(n)} {noun(len(names), 'of', 'each of')} {listed(names)} ({noun(n, 'frame')} {where})"
         for (n, where), names in grouped(found).items()
     ]
     return [f"Pose covariances that are not positive definite, which NEES leaves out: {listed(each)}."] if each else []
@@ -226,10 +225,9 @@ def _common_observations(run: Run) -> list[str]:
             medians[result.name] = reprojection_summary(table[table["observation"].isin(common)])["median"]
     if len(medians) < 2:
         return []
-    each = listed(f"{number(medians[name])} px for {name}" for name in sorted(medians, key=lambda name: medians[name]))
     return [
         f"Median reprojection error over the {counted(len(common), 'observation')} that all estimators with landmark "
-        f"updates used: {each}."
+        f"updates used: {in_pixels(medians)}."
     ]
 
 
@@ -264,3 +262,29 @@ def _assumed_noise(run: Run) -> list[str]:
     sigma = np.sqrt(np.median(np.diagonal(problem.increment_covariance, axis1=1, axis2=2), axis=0))
     motion = f"{number(float(sigma[:3].max()))} m and {number(float(np.rad2deg(sigma[3:].max())))}° per frame"
     return [f"Not diagnosed: the noise (1-sigma) is assumed, {pixels} px, {motion}."]
+
+
+def track_sentences(sequence: Sequence, size: tuple[float, float]) -> list[str]:
+    """Number and length of the tracks, observations a frame, and sparse cells of a left image of `size`, px."""
+    o, T = sequence.observations, sequence.n_frames
+    if len(o) == 0:
+        return []
+    length = o.counts(sequence.n_landmarks)
+    length = length[length > 0]
+    per_frame = np.bincount(o.frame, minlength=T)
+    fewest = int(np.argmin(per_frame))
+    return [
+        f"{counted(len(length), 'track')} of {number(float(length.mean()))} frames on average (median "
+        f"{int(np.median(length))}, longest {int(length.max())}).",
+        f"{number(float(per_frame.mean()))} recorded observations a frame on average, fewest in frame {fewest} "
+        f"({int(per_frame[fewest])}).",
+        f"Sparse cells of the 3 x 3 grid of the {'image' if sequence.monocular else 'left image'} (below "
+        f"{limit_per_cent(SPARSE)} of an even share): {listed(_sparse_cells(o.pixel[:, :2], size)) or 'none'}.",
+    ]
+
+
+def _sparse_cells(pixel: FloatArray, size: tuple[float, float]) -> list[str]:
+    """Names of the cells of the image with few of the points (n, 2)."""
+    cell = np.clip((3.0 * pixel / np.array(size)).astype(np.int64), 0, 2)
+    share = np.bincount(3 * cell[:, 1] + cell[:, 0], minlength=9) / len(pixel)
+    return [f"{REGION_ROWS[k // 3]} {REGION_COLUMNS[k % 3]}" for k in np.flatnonzero(share < SPARSE / 9.0)]

@@ -15,39 +15,34 @@ from fgbaseline.compare import (
     RmseDifference,
     Verdict,
     divergence_summary,
+    is_claimed,
+    is_level,
     paired_ranking,
-    rmse_difference,
 )
 from fgbaseline.compare.divergence_onset import path_length
 from fgbaseline.compare.estimate_comparison import Result, Run
+from fgbaseline.compare.overconfidence import (
+    Overconfidence,
+    large_reference_nees,
+    overconfidence_bound,
+    overconfident_estimates,
+)
 from fgbaseline.compare.reference_trust import BATCH_CRITERIA
 from fgbaseline.compare.sample_sizes import insufficient_truth
+from fgbaseline.compare.statistics.paired_bootstrap import MIN_DIFFERENCE
 from fgbaseline.data import EventKind
 from fgbaseline.data.wording import noun, plural
-from fgbaseline.geometry import FloatArray
 
 from ..formatting import counted, distance, limit_per_cent, listed, number, per_cent, resolved
 from ..results.metric_registry import ate_resolution
-from .evidence import causal_estimate, no_difference, overconfidence_bound
+from .evidence import causal_estimate, no_difference
 
 IN_FULL = 3
 """overconfident estimators with their values; of the others only the names"""
 FEW = 2
 """differences whose intervals stand in a sentence"""
-MIN_DIFFERENCE = 0.01
-"""smallest difference of two RMSE that is claimed, as a share of the smaller: paired errors make less significant, but
-it has no consequence"""
 WITHIN_SIGMAS = 3.0
 """sigmas of the reference up to which an order by divergence says nothing on accuracy"""
-
-
-def is_claimed(difference: RmseDifference, larger: float, smaller: float) -> bool:
-    """Whether an RMSE is larger than another, significantly and by more than `MIN_DIFFERENCE`."""
-    return difference.settled and difference.value > 0.0 and larger > smaller and not _is_level(larger, smaller)
-
-
-def _is_level(larger: float, smaller: float) -> bool:
-    return larger <= (1.0 + MIN_DIFFERENCE) * smaller
 
 
 def ate_sentences(run: Run) -> list[str]:
@@ -77,9 +72,9 @@ def _against_reference(run: Run, errors: dict[str, np.ndarray]) -> list[str]:
     if reference not in found.rmse:
         return []
     own, text = found.rmse[reference], {n: resolved(value, ate_resolution(run)) for n, value in found.rmse.items()}
-    smaller = [name for name in found.rmse if name != reference and found.rmse[name] < own]
-    pairs = {name: rmse_difference(*_common(errors, (reference, name), found)) for name in smaller}
-    level = [name for name in smaller if _is_level(own, found.rmse[name])]
+    smaller = [name for name in found.rmse if found.rmse[name] < own]
+    pairs = {name: found.difference(reference, name) for name in smaller}
+    level = [name for name in smaller if is_level(own, found.rmse[name])]
     equal = [name for name in smaller if name in level or text[name] == text[reference]]
     better = [name for name in smaller if name not in equal and is_claimed(pairs[name], own, found.rmse[name])]
     over = _over(run, found)
@@ -142,7 +137,7 @@ def _ranked(run: Run, rivals: dict[str, Result], found: PairedRanking) -> list[s
     over = f"RMSE over a path length of {number(path_length(rivals[first]))} m{_over(run, found)}{_unranked(run)}"
     larger = [name for name in others if is_claimed(found.behind[name], found.rmse[name], found.rmse[first])]
     level = [name for name in others if name not in larger]
-    equal = [name for name in level if _is_level(found.rmse[name], found.rmse[first])]
+    equal = [name for name in level if is_level(found.rmse[name], found.rmse[first])]
     is_smallest = bool(larger) and not level
     title = "Smallest divergence" if is_smallest else "Divergence"
     sentences = [f"{title} from {run.reference} ({over}): {each([first, *level])}."]
@@ -210,59 +205,41 @@ def _over(run: Run, found: PairedRanking) -> str:
     return "" if found.moments == T else f", over the {number(found.moments)} of {counted(T, 'frame')} that all have"
 
 
-def _common(
-    errors: dict[str, np.ndarray], names: tuple[str, str], found: PairedRanking
-) -> tuple[np.ndarray, np.ndarray]:
-    """The errors of two estimates in the frames that all ranked ones have."""
-    everywhere = ~np.any([np.isnan(errors[name]) for name in found.rmse], axis=0)
-    first, second = (errors[name][everywhere] for name in names)
-    return first, second
-
-
 def overconfidence_sentences(run: Run) -> list[str]:
     """One sentence on all overconfident estimators: the reference, then the largest error over its claimed sigma."""
-    found = sorted(
-        (r for r in run.answered if is_overconfident(run, r)),
-        key=lambda r: (r.name != run.reference, -_actual(run, r)[0] / _claimed(r)),
-    )
+    found = overconfident_estimates(run)
     if not found:
         return []
-    each = "; ".join(_claim(run, result) for result in found[:IN_FULL])
-    others = [result.name for result in found[IN_FULL:]]
+    each = "; ".join(_claim(run, estimate) for estimate in found[:IN_FULL])
+    others = [estimate.name for estimate in found[IN_FULL:]]
     more = f"; likewise {listed(others)}" if others else ""
     return [f"Overconfident: {each}{more}."]
 
 
-def is_overconfident(run: Run, result: Result) -> bool:
-    """Whether covariances contradict errors: the median NEES to ground truth exceeds the bound of a single pose.
-
-    Against the reference it counts only beside a claimed sigma below the divergence; P smaller than P_ref in most
-    frames counts in the same way.
-    """
-    if _is_inconsistent(result):
-        return True
-    difference = None if result.name in run.unranked else result.evidence.difference
-    if difference is None or not 0.0 < _claimed(result) < _actual(run, result)[0]:
-        return False
-    return difference.is_overconfident or _median(difference.nees) > overconfidence_bound()
-
-
-def _is_inconsistent(result: Result) -> bool:
-    return result.nees is not None and _median(result.nees) > overconfidence_bound()
+def _claim(run: Run, estimate: Overconfidence) -> str:
+    origin = "ground truth" if estimate.from_truth else run.reference
+    figures = {
+        "median NEES of the pose": estimate.nees,
+        "median reference NEES": estimate.reference_nees,
+        f"median sigma ratio to {run.reference}": estimate.sigma_ratio,
+    }
+    known = [f"{name} {number(value)}" for name, value in figures.items() if np.isfinite(value)]
+    measured = f"(RMSE{'; ' if known else ''}{', '.join(known)})"
+    if estimate.sigma >= estimate.rmse:
+        return (
+            f"{estimate.name} differs from {origin} by {number(estimate.rmse)} m {measured}, less than its position "
+            f"sigma of {number(estimate.sigma)} m (RMS), but its covariance is too small in rotation or in a single "
+            "direction"
+        )
+    return (
+        f"{estimate.name} claims a position sigma of {number(estimate.sigma)} m (RMS) but differs from {origin} by "
+        f"{number(estimate.rmse)} m {measured}"
+    )
 
 
 def reference_nees_sentences(run: Run) -> list[str]:
-    """Estimators whose median reference NEES exceeds the bound of one pose although their sigma covers the divergence.
-
-    They are not called overconfident, since their position sigma is not below their RMSE.
-    """
-    medians = {}
-    for result in run.answered:
-        difference = None if result.name in run.unranked else result.evidence.difference
-        if difference is None or is_overconfident(run, result) or 2 * difference.left_out.sum() > run.problem.n_frames:
-            continue
-        medians[result.name] = _median(difference.nees)
-    each = [f"{name} {number(nees)}" for name, nees in medians.items() if nees > overconfidence_bound()]
+    """Estimators that are not called overconfident, since their sigma covers the divergence, but have a large NEES."""
+    each = [f"{name} {number(nees)}" for name, nees in large_reference_nees(run).items()]
     if not each:
         return []
     its, small = ("Its", "covariance is") if len(each) == 1 else ("Their", "covariances are")
@@ -271,43 +248,3 @@ def reference_nees_sentences(run: Run) -> list[str]:
         f"pose). {its} position sigma covers the divergence, but the pose {small} too small in rotation or in a single "
         "direction."
     ]
-
-
-def _claim(run: Run, result: Result) -> str:
-    distance, other = _actual(run, result)
-    ratio, difference = result.evidence.sigma_ratio, result.evidence.difference
-    if difference is not None and difference.is_overconfident:
-        difference = None  # its NEES is that of the few frames in which P - P_ref is positive definite
-    figures = {
-        "median NEES of the pose": float("nan") if result.nees is None else _median(result.nees),
-        "median reference NEES": float("nan") if difference is None else _median(difference.nees),
-        f"median sigma ratio to {run.reference}": float("nan") if ratio is None else float(ratio["position"].median()),
-    }
-    known = ", ".join(f"{name} {number(value)}" for name, value in figures.items() if np.isfinite(value))
-    measured = f"; {known}" if known else ""
-    claimed = number(_claimed(result))
-    if _claimed(result) >= distance:
-        return (
-            f"{result.name} differs from {other} by {number(distance)} m (RMSE{measured}), less than its position "
-            f"sigma of {claimed} m (RMS), but its covariance is too small in rotation or in a single direction"
-        )
-    return (
-        f"{result.name} claims a position sigma of {claimed} m (RMS) but differs from {other} by {number(distance)} m "
-        f"(RMSE{measured})"
-    )
-
-
-def _actual(run: Run, result: Result) -> tuple[float, str]:
-    """RMSE of the positions, m, unaligned, and what it is measured from: ground truth where NEES rests on it."""
-    table = result.truth if _is_inconsistent(result) or result.name == run.reference else result.divergence
-    distance = float("nan") if table is None else float(np.sqrt(np.nanmean(table["position"].to_numpy() ** 2)))
-    return distance, "ground truth" if table is result.truth else str(run.reference)
-
-
-def _claimed(result: Result) -> float:
-    return result.evidence.sigma.position_rmse
-
-
-def _median(values: FloatArray) -> float:
-    known = values[~np.isnan(values)]
-    return float(np.median(known)) if len(known) else float("nan")

@@ -11,7 +11,7 @@ from fgbaseline.data import Status
 from fgbaseline.data.wording import plural
 
 from ..formatting import limit_per_cent, meters, per_cent, pixels
-from .experiments import Outcome, Staged, Study, path_length
+from .experiments import Outcome, Staged, Study
 from .recordings import PAPER_RECORDINGS, PaperRecording
 
 MIN_CAUSE_FACTOR = 1.5
@@ -130,7 +130,7 @@ def _predicted(study: Study) -> Claim:
     def climb(staged: Staged) -> float:
         return abs(float(staged.predicted[-1, :3, 3] @ staged.stage.sequence.up))
 
-    road, end = path_length(study.predicted), float(study.predicted[-1, :3, 3] @ study.subject.recorded.up)
+    road, end = study.road, float(study.predicted[-1, :3, 3] @ study.subject.recorded.up)
     way = "above" if end > 0 else "below"
     return claim_on(
         study,
@@ -146,13 +146,14 @@ def _predicted(study: Study) -> Claim:
 def _mapped(study: Study) -> Claim:
     mapped = study.mapped[max(study.mapped)]
     apart = float(np.abs(mapped.estimate.world_T_imu - study.staged[0].predicted).max())
+    equal = "are bitwise equal" if apart == 0.0 else f"differ by up to {apart:.2g}"
     before, after = mapped.before.reprojection, mapped.after.reprojection
     return claim_on(
         study,
         "mapping",
         "after the landmark update the trajectory is dead reckoning's, which justifies that update",
         Verdict.IN_PART if apart == 0.0 else Verdict.FALSE,
-        f"{_apart(apart)}, while the median reprojection error of {mapped.after.features} landmarks goes from "
+        f"the trajectories {equal}, while the median reprojection error of {mapped.after.features} landmarks goes from "
         f"{before:.3g} to {after:.3g} px",
         "equal by construction: mapping does not change the poses. The landmarks have the errors of the trajectory",
     )
@@ -177,7 +178,7 @@ def _works(study: Study) -> Claim:
 
 
 def _like_dead_reckoning(study: Study) -> Claim:
-    now, road = study.recorded, path_length(study.predicted)
+    now, road = study.recorded, study.road
     noisy = now.correction_m > MAX_CORRECTION or now.correction_deg > MAX_CORRECTION
     alike = now.apart_rmse < MAX_DISTANCE * road
     verdict = Verdict.HOLDS if alike and noisy else Verdict.IN_PART if alike or noisy else Verdict.FALSE
@@ -215,7 +216,7 @@ def _low_noise(study: Study) -> Claim:
 def _every_noise(study: Study) -> Claim:
     runs = [*study.swept, *study.held]
     failing = sum(run.breaks for run in runs)
-    off = sum(not run.breaks and not run.apart_rmse < MAX_DISTANCE * path_length(study.predicted) for run in runs)
+    off = sum(not run.breaks and not run.apart_rmse < MAX_DISTANCE * study.road for run in runs)
     verdict = Verdict.HOLDS if failing == len(runs) else Verdict.IN_PART if failing else Verdict.FALSE
     repaired = study.swept_repaired
     return claim_on(
@@ -227,14 +228,6 @@ def _every_noise(study: Study) -> Claim:
         f"{limit_per_cent(MAX_DISTANCE)} of its length from dead reckoning",
         "landmarks cross the camera plane: " + causes(study, lambda s: s.outcome.apart_rmse, meters),
         f"they fail in {sum(run.breaks for run in repaired)} of {len(repaired)} settings" if repaired else "",
-    )
-
-
-def _apart(difference: float) -> str:
-    return (
-        "the trajectories are bitwise equal"
-        if difference == 0.0
-        else f"the trajectories differ by up to {difference:.2g}"
     )
 
 

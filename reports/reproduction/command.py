@@ -1,7 +1,7 @@
 """`fgbaseline reproduce`: recordings, studies, claims, and the folder with figures, tables and page."""
 
-import csv
 import json
+from collections.abc import Mapping
 from collections.abc import Sequence as Several
 from dataclasses import asdict
 from importlib.metadata import version
@@ -10,24 +10,56 @@ from typing import Any
 
 import click
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
 from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import InputError
 
 from ..figures import save
 from ..figures.reproduction import draw
+from ..formatting import meters, number, per_cent
+from ..html.page import Block, Grid, Note, Page, Pair, Section, pictures
+from ..html.rendering import render_page
 from ..progress import reporter
+from ..results.glossary import INERTIAL_TERMS, TERMS
+from ..tables.table import Column, Row, Table, numbers, words
 from ..tables.writers import print_table
-from .claims import Claim, claims_of, missing_claims
-from .experiments import Study, SweepSettings, stages_of, study_recording
-from .page import claims_table, render
+from .claims import Claim, Verdict, claims_of, missing_claims
+from .experiments import Outcome, Study, SweepSettings, stages_of, study_recording
 from .recordings import read_subjects
 
 MARK = "claims.json"
 """the file that marks a reproduction's folder"""
 UNWRAPPED = 150
 """columns of the table where no terminal says how many there are"""
+BADGES: Mapping[str, str] = {
+    Verdict.HOLDS: "trusted",
+    Verdict.IN_PART: "doubtful",
+    Verdict.FALSE: "untrusted",
+    Verdict.CANNOT_TELL: "",
+}
+"""style of each verdict: good, fair and poor"""
+STAGES = (
+    *words("repaired"),
+    *numbers("from dead reckoning, RMS", "largest"),
+    Column("reprojection", unit="px"),
+    *numbers("cheirality violated", "frames, not positive definite", "correction per update, RMS"),
+)
+CAPTIONS: Mapping[str, str] = {
+    "sweep": "Landmarks updated in turn with the pose, W as in the source paper. Numbers: RMS distance from dead "
+    "reckoning (darker: larger), and frames where the printed covariance is not positive definite. Below: the filter "
+    "of figure 9 after one repair after another, and the share of observations that violate cheirality.",
+    "causes_": "Each panel has the repairs of the one before. Distances: RMS from the dead reckoning of the same "
+    "panel.",
+}
+"""captions by the beginning of a figure's name"""
+NUMBERED = (
+    "In the order and under the numbers of the report; x and y of the world as it plots them, seen along z of the IMU "
+    "at the start."
+)
 
 
 def reproduce(paths: Several[Path], out: Path, sweep: SweepSettings, *, force: bool) -> int:
@@ -37,15 +69,12 @@ def reproduce(paths: Several[Path], out: Path, sweep: SweepSettings, *, force: b
     """
     require_free(out, force=force, mark=MARK)
     _require_distinct(sweep)
-    progress = reporter()
+    progress, studies = reporter(), []
     subjects = read_subjects(paths)
-    studies = []
     with threadpool_limits(limits=1, user_api="blas"):
         for subject in subjects:
-            if subject.stand_in is None:
-                progress.print_line(f"{subject.name}: diagnosing the recording")
-            else:
-                progress.print_line(f"{subject.name}: {subject.stand_in.remark}")
+            doing = "diagnosing the recording" if subject.stand_in is None else subject.stand_in.remark
+            progress.print_line(f"{subject.name}: {doing}")
             found = stages_of(subject)
             with progress.estimator(subject.name) as frames_done:
                 studies.append(study_recording(subject, sweep, found, frames_done))
@@ -53,7 +82,7 @@ def reproduce(paths: Several[Path], out: Path, sweep: SweepSettings, *, force: b
     progress.print_line("writing the report")
     with atomic_folder(out, force=force, mark=MARK) as folder:
         write(studies, claims, folder)
-    print_table(claims_table(claims), width=UNWRAPPED, spaced=True)
+    print_table(_terminal_table(claims), width=UNWRAPPED, spaced=True)
     click.echo(f"\nThe report is in {out / 'report.html'}")
     return 0
 
@@ -69,8 +98,10 @@ def write(studies: Several[Study], claims: Several[Claim], folder: Path) -> None
     figures = draw(studies)
     (folder / "figures").mkdir()
     save(figures, folder / "figures", forms=("png", "svg", "pdf"))
-    _write_csv(folder / "claims.csv", [asdict(claim) for claim in claims])
-    _write_csv(folder / "sweep.csv", [row for study in studies for row in _sweep(study)])
+    tables = {"claims.csv": map(asdict, claims), "sweep.csv": (row for study in studies for row in _sweep(study))}
+    for file, rows in tables.items():
+        table = pd.DataFrame(list(rows), dtype=object)  # integers beside missing values stay integers
+        table.to_csv(folder / file, index=False, lineterminator="\r\n")
     (folder / "report.html").write_text(render(studies, claims, figures), encoding="utf-8")
     document = {
         "schema": "fgbaseline/reproduction/1",
@@ -109,8 +140,104 @@ def _sweep(study: Study) -> list[dict[str, object]]:
     return [{"recording": name, "state": state, **o.record()} for state, runs in states.items() for o in runs]
 
 
-def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+def render(studies: Several[Study], claims: Several[Claim], figures: Mapping[str, Figure]) -> str:
+    """The page `report.html`; text from files is escaped."""
+    drawn = pictures(figures, CAPTIONS)
+    numbered = [p for name, p in drawn.items() if name.startswith("figure_")]
+    others = [p for name, p in drawn.items() if not name.startswith(("figure_", *CAPTIONS))]
+    stand_ins = [
+        Note(f"{subject.name}. {subject.stand_in.remark} The results of its SLAM are those of this simulation.")
+        for subject in (study.subject for study in studies)
+        if subject.stand_in is not None
+    ]
+    paper: list[Block] = [Note(NUMBERED), Pair(numbered)] if numbered else []
+    if others:
+        paper += [Note("Of the same kind, not in the report", is_heading=True), Pair(others)]
+    stages: list[Block] = [p for name, p in drawn.items() if name.startswith("causes_")]
+    stages += [Grid(_stages(study), "stages", is_titled=True) for study in studies]
+    return render_page(
+        Page(
+            kind="reproduction",
+            title="The report on the documented filter, reproduced",
+            about=" ".join(_about(study) for study in studies),
+            verdict=[sentence for study in studies for sentence in sentences(study)],
+            table=Section(
+                "claims",
+                "The report's claims",
+                [*stand_ins, Grid(_page_table(claims), "plain claims", BADGES)],
+                "Claims",
+            ),
+            sections=[
+                Section("sweep", "Where the filter breaks, and why", [drawn["sweep"]], "Where it breaks"),
+                Section("figures", "Figures of the source paper", paper, "Figures"),
+                Section("stages", "Cause by cause", stages),
+            ],
+            terms=TERMS.keys() - INERTIAL_TERMS.keys(),
+        )
+    )
+
+
+def _about(study: Study) -> str:
+    recorded, studied = study.subject.recorded, study.subject.studied
+    return (
+        f"{study.subject.label}: {number(recorded.n_frames)} frames, {number(len(studied.observations))} stereo "
+        f"observations of {number(studied.n_landmarks)} tracks."
+    )
+
+
+def _page_table(claims: Several[Claim]) -> Table:
+    columns = words("of", "verdict", "measured", "behind it", "on the repaired recording")
+    rows = [
+        Row.of(
+            c.claim,
+            f"{c.recording}{' (simulated features)' if c.simulated else ''}",
+            c.verdict,
+            c.measured,
+            c.cause,
+            c.repaired or "–",
+        )
+        for c in claims
+    ]
+    return Table(columns, tuple(rows), name="the report says")
+
+
+def _terminal_table(claims: Several[Claim]) -> Table:
+    columns = words("claim of the source paper", "verdict", "measured")
+    rows = [
+        Row.of(f"{c.recording}{' (simulated)' if c.simulated else ''}", c.claim, c.verdict, c.measured) for c in claims
+    ]
+    return Table(columns, tuple(rows), name="recording")
+
+
+def _stages(study: Study) -> Table:
+    """Table of the documented filter after each repair of a recording."""
+    truth = study.subject.studied.truth is not None
+    rows = []
+    for staged in study.staged:
+        o = staged.outcome
+        texts = [staged.stage.cause or "–", meters(o.apart_rmse), meters(o.apart_max), number(o.reprojection)]
+        texts += [per_cent(o.behind), number(o.lost), meters(o.correction_m)]
+        texts += [meters(o.truth_rmse)] if truth else []
+        rows.append(Row.of(staged.stage.name, *texts))
+    columns = (*STAGES, *(numbers("from ground truth, RMS") if truth else ()))
+    return Table(columns, tuple(rows), name="stage", title=study.subject.label)
+
+
+def sentences(study: Study) -> list[str]:
+    """Two sentences on a recording: the filter on the data as recorded, and on the repaired data."""
+    label, now, then = study.subject.label, study.recorded, study.repaired
+    first = (
+        f"{label}: the documented filter with {now.features} features and V = {now.settings.pixel_variance:g} I is "
+        f"{_state(now)}."
+    )
+    if not study.causes:
+        return [first, f"{label}: no fault detected."]
+    return [first, f"{label}, repaired ({'; '.join(study.causes)}): it is {_state(then)}."]
+
+
+def _state(outcome: Outcome) -> str:
+    lost = f"not positive definite at {plural(outcome.lost, 'frame')}" if outcome.lost else "always positive definite"
+    return (
+        f"{meters(outcome.apart_rmse)} (RMS) from dead reckoning with a median reprojection error of "
+        f"{outcome.reprojection:.3g} px, its printed covariance {lost}"
+    )

@@ -6,14 +6,14 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from fgbaseline import compare, ekf
+from fgbaseline.compare import summarized
 from fgbaseline.data import Estimate, LandmarkMode, Problem, Progress, Sequence, Status, documented
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES, SLAM_PIXEL_VARIANCE
 from fgbaseline.data.velocity_increments import dead_reckoned_path, increments
 from fgbaseline.diagnosis import Diagnosis, diagnose
 from fgbaseline.geometry import FloatArray, se3
 
-from .recordings import MAPPED, Subject
-from .repair_ablation import Stage, diagnosed_stages, simulated_stages
+from .recordings import MAPPED, Stage, Subject, diagnosed_stages, simulated_stages
 
 LOW_PIXEL_VARIANCE = 0.01
 LOW_MOTION = 1e-6
@@ -126,6 +126,11 @@ class Study:
     swept_repaired: list[Outcome]
 
     @property
+    def road(self) -> float:
+        """Length of the dead-reckoned path, m."""
+        return float(compare.distance_traveled(self.predicted[:, :3, 3])[-1])
+
+    @property
     def recorded(self) -> Outcome:
         """The filter of figure 9 on the recording as recorded."""
         return self.staged[0].outcome
@@ -150,10 +155,7 @@ def stages_of(subject: Subject) -> tuple[Diagnosis | None, list[Stage]]:
 
 
 def study_recording(
-    subject: Subject,
-    sweep: SweepSettings,
-    found: tuple[Diagnosis | None, list[Stage]],
-    progress: Progress,
+    subject: Subject, sweep: SweepSettings, found: tuple[Diagnosis | None, list[Stage]], progress: Progress
 ) -> Study:
     """Runs the documented filter on a recording with all settings of the source paper."""
     diagnosis, stages = found
@@ -234,12 +236,14 @@ def run_filter(sequence: Sequence, settings: FilterSettings) -> tuple[Outcome, E
 
 def evaluate(problem: Problem, settings: FilterSettings, estimate: Estimate) -> Outcome:
     """Computes the metrics of an estimate."""
-    predicted = dead_reckoned_path(problem.increment, problem.initial_pose)
-    apart = np.linalg.norm(estimate.world_T_imu[:, :3, 3] - predicted[:, :3, 3], axis=1)
+    path, predicted = estimate.world_T_imu, dead_reckoned_path(problem.increment, problem.initial_pose)
+    apart, truth = _apart(path, predicted), problem.sequence.truth
     table = compare.reprojection(problem.sequence, estimate)
     pixels = compare.reprojection_summary(table)
     complete = estimate.status is not Status.FAILED
-    correction = _corrections(estimate.world_T_imu, predicted) if complete else np.full((1, 6), np.nan)
+    correction = np.full((1, 6), np.nan)  # (T-1, 6), [v, w], from each predicted motion to the estimated one
+    if complete:
+        correction = se3.log(se3.inverse(se3.relative(predicted)) @ se3.relative(path))
     return Outcome(
         settings=settings,
         features=len(problem.features),
@@ -247,34 +251,18 @@ def evaluate(problem: Problem, settings: FilterSettings, estimate: Estimate) -> 
         reason=estimate.reason,
         lost=len(estimate.events),
         first_lost=estimate.events[0].frame if estimate.events else None,
-        apart_rmse=_rms(apart) if complete else np.nan,
+        apart_rmse=summarized(apart)["rmse"] if complete else np.nan,
         apart_max=float(apart.max()) if complete else np.nan,
         apart_final=float(apart[-1]),
-        correction_m=_rms(np.linalg.norm(correction[:, :3], axis=1)),
-        correction_deg=float(np.rad2deg(_rms(np.linalg.norm(correction[:, 3:], axis=1)))),
+        correction_m=summarized(np.linalg.norm(correction[:, :3], axis=1))["rmse"],
+        correction_deg=float(np.rad2deg(summarized(np.linalg.norm(correction[:, 3:], axis=1))["rmse"])),
         reprojection=float(pixels["median"]) if complete else np.nan,
         behind=float(pixels["behind_camera"]) / max(1, len(table)) if complete else np.nan,
-        height=float(estimate.world_T_imu[-1, :3, 3] @ problem.sequence.up),
-        truth_rmse=_from_truth(problem.sequence, estimate.world_T_imu) if complete else np.nan,
+        height=float(path[-1, :3, 3] @ problem.sequence.up),
+        truth_rmse=np.nan if truth is None or not complete else summarized(_apart(path, truth.world_T_imu))["rmse"],
     )
 
 
-def path_length(path: FloatArray) -> float:
-    """Length of a path (T, 4, 4), m."""
-    return float(np.linalg.norm(np.diff(path[:, :3, 3], axis=0), axis=1).sum())
-
-
-def _corrections(path: FloatArray, predicted: FloatArray) -> FloatArray:
-    """Corrections (T-1, 6), [v, w], from each predicted motion to the estimated one."""
-    return se3.log(se3.inverse(se3.relative(predicted)) @ se3.relative(path))
-
-
-def _from_truth(sequence: Sequence, path: FloatArray) -> float:
-    if sequence.truth is None:
-        return np.nan
-    apart = np.linalg.norm(path[:, :3, 3] - sequence.truth.world_T_imu[:, :3, 3], axis=1)
-    return _rms(apart[np.isfinite(apart)])
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
+def _apart(path: FloatArray, other: FloatArray) -> FloatArray:
+    """Distances (T,), m, of poses (T, 4, 4)."""
+    return np.asarray(np.linalg.norm(path[:, :3, 3] - other[:, :3, 3], axis=1))

@@ -1,4 +1,6 @@
-"""Recordings of a reproduction: the source paper's two, those given, and simulated stand-ins for missing features."""
+"""Recordings of a reproduction: the source paper's two, those given, simulated stand-ins for missing features, and each
+recording repaired one fault at a time.
+"""
 
 from collections.abc import Mapping
 from collections.abc import Sequence as Several
@@ -7,12 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from fgbaseline.data import Observations, Sequence, read
-from fgbaseline.data.axis_conventions import axes_matrix
+from fgbaseline.data import Excluded, Observations, Sequence, read
+from fgbaseline.data.axis_conventions import IDENTITY, axes_matrix
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.simulate import Simulation, Velocities, simulate_with_labels
 from fgbaseline.data.simulate.rig import rig_of
+from fgbaseline.data.velocity_increments import Shift, zero_order_hold
 from fgbaseline.data.wording import per_cent, plural
+from fgbaseline.diagnosis import Diagnosis, repair
+from fgbaseline.diagnosis.repairs.significance import significant_bias
+from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.geometry import FloatArray, InputError
 
 MAPPED = (700, 1000)
@@ -25,6 +31,7 @@ STANDSTILL = 0.2
 """m/s, speed below which the mean rate is the bias of the gyroscope"""
 LEAST_STANDSTILL = 20
 """fewest frames for an estimate of the bias"""
+AS_RECORDED = "as recorded"
 FIRST_TRY, MORE, TRIES = 14.0, 1.3, 6
 """features in view per new track of a frame; factor of the next try; number of tries"""
 
@@ -103,11 +110,9 @@ def read_subjects(paths: Several[Path]) -> list[Subject]:
     """
     every = [read(path) for path in paths]
     for i, sequence in enumerate(every):
-        for before in every[:i]:
-            if _same(before, sequence):
-                raise InputError(
-                    f"{paths[i]}: this is the same recording as {before.source or before.name}; give each once"
-                )
+        same = next((before for before in every[:i] if _same(before, sequence)), None)
+        if same is not None:
+            raise InputError(f"{paths[i]}: this is the same recording as {same.source or same.name}; give each once")
     _require_different_names(paths, every)
     subjects = [Subject(s, paper_recording(s.n_frames), None if len(s.observations) else stand_in(s)) for s in every]
     return sorted(subjects, key=lambda subject: "~" if subject.paper is None else subject.paper.name)
@@ -162,12 +167,8 @@ def _bias(recorded: Sequence) -> tuple[FloatArray, str]:
     still = np.linalg.norm(recorded.linear_velocity, axis=1) < STANDSTILL
     if still.sum() < LEAST_STANDSTILL:
         return np.zeros(3), "without a bias, since there is no standstill to measure it at"
-    bias = np.median(recorded.angular_velocity[still], axis=0)
-    read = ", ".join(f"{rate:.4f}" for rate in bias)
-    return (
-        bias,
-        f"with a gyroscope bias of ({read}) rad/s, measured in {plural(int(still.sum()), 'frame')} of standstill",
-    )
+    bias, frames = np.median(recorded.angular_velocity[still], axis=0), plural(int(still.sum()), "frame")
+    return bias, f"with a gyroscope bias of {_vector(bias)} rad/s, measured in {frames} of standstill"
 
 
 def _of_size(simulation: Simulation, wanted: int, seed: int) -> tuple[Sequence, BoolArray]:
@@ -195,3 +196,87 @@ def _thinned(sequence: Sequence, keep: BoolArray) -> Sequence:
         n_landmarks=int(keep.sum()),
         truth=replace(truth, landmarks=truth.landmarks[keep]),
     )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Stage:
+    """The recording with all faults up to this stage repaired, to show the effect of each on the documented filter."""
+
+    name: str
+    cause: str
+    """the fault that this stage repairs; empty for the recording as recorded"""
+    sequence: Sequence
+
+
+def diagnosed_stages(diagnosis: Diagnosis) -> list[Stage]:
+    """Stages of a diagnosed recording: as recorded, then with one more fault repaired: axes, bias, interval, tracks."""
+    stages = [Stage(AS_RECORDED, "", diagnosis.sequence)]
+    if diagnosis.fit is None:
+        return stages
+    angular, linear, bias = diagnosis.angular, diagnosis.linear, significant_bias(diagnosis)
+    if angular.changed or linear.changed:
+        stages.append(_axes_repaired(stages[-1], angular.name, linear.name))
+    if bias.any():
+        stages.append(_bias_removed(stages[-1], bias, angular.name))
+    if diagnosis.shift != Shift.AFTER:
+        cause = f"velocities assigned to the wrong interval (by {-diagnosis.shift:g} intervals)"
+        stages.append(Stage("right interval", cause, _restamped(stages[-1].sequence, diagnosis.shift)))
+    repaired = repair(diagnosis, MaskSettings())
+    good = repaired.excluded == Excluded.NO
+    if not good.all():
+        tracked = replace(
+            stages[-1].sequence,
+            imu_T_cam=repaired.sequence.imu_T_cam,
+            observations=repaired.sequence.observations.select(good),
+            n_landmarks=repaired.sequence.n_landmarks,
+            truth=repaired.sequence.truth,
+        )
+        copied = ", copied frames" if (repaired.excluded == Excluded.COPIED).any() else ""
+        cause = f"wrong matches{copied} and other unusable observations ({per_cent(float(np.mean(~good)))} of all)"
+        stages.append(Stage("right matches", cause, tracked))
+    return stages
+
+
+def simulated_stages(simulated: StandIn) -> list[Stage]:
+    """The stages of a simulated recording, whose faults are known."""
+    stages = [Stage(AS_RECORDED, "", simulated.sequence)]
+    stages.append(_axes_repaired(stages[-1], simulated.angular_axes, IDENTITY))
+    if simulated.gyro_bias.any():
+        stages.append(_bias_removed(stages[-1], simulated.gyro_bias, simulated.angular_axes))
+    if simulated.wrong.any():
+        now, cause = (
+            stages[-1].sequence,
+            f"wrong matches ({per_cent(float(simulated.wrong.mean()))} of the observations)",
+        )
+        right = replace(now, observations=now.observations.select(~simulated.wrong))
+        stages.append(Stage("right matches", cause, right))
+    return stages
+
+
+def _axes_repaired(stage: Stage, angular: str, linear: str) -> Stage:
+    every = (("angular", angular), ("linear", linear))
+    wrong = [f"{what} velocity, {name}" for what, name in every if name != IDENTITY]
+    turned = replace(
+        stage.sequence,
+        angular_velocity=stage.sequence.angular_velocity @ axes_matrix(angular).T,
+        linear_velocity=stage.sequence.linear_velocity @ axes_matrix(linear).T,
+    )
+    return Stage("axes agree", f"inconsistent axes of the {' and of the '.join(wrong)}", turned)
+
+
+def _bias_removed(stage: Stage, bias: FloatArray, angular: str) -> Stage:
+    """The stage without a bias (3,) in recorded axes, whose rates are in the axes that `angular` gives them."""
+    rates = stage.sequence.angular_velocity - bias @ axes_matrix(angular).T
+    cause = f"gyroscope bias of {_vector(bias)} rad/s"
+    return Stage("without bias", cause, replace(stage.sequence, angular_velocity=rates))
+
+
+def _restamped(sequence: Sequence, shift: float) -> Sequence:
+    """The recording in which velocity k moves frame k to k + 1."""
+    twist = zero_order_hold(sequence, shift)
+    twist = np.concatenate([twist, twist[-1:]])
+    return replace(sequence, linear_velocity=twist[:, :3], angular_velocity=twist[:, 3:])
+
+
+def _vector(values: FloatArray) -> str:
+    return f"({', '.join(f'{value:.4f}' for value in values)})"

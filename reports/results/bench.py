@@ -1,11 +1,13 @@
-"""Results of a bench, a row per run and estimator, and their statistics: cases, rankings, consistency, costs.
+"""Jobs of a bench, its results, a row per run and estimator, and their statistics: cases, rankings, consistency, costs.
 
-A case is a sequence with its settings; its runs differ in the seed.
+A case is a sequence with its settings; its runs differ in the seed. Jobs are plain data for any process on any machine.
 """
 
+import hashlib
+import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -13,7 +15,6 @@ import pandas as pd
 from fgbaseline import compare
 from fgbaseline.geometry import FloatArray
 
-from ..bench.job import Planned
 from .metric_record import Metric
 from .metric_registry import METRICS, PERCENT
 
@@ -22,6 +23,99 @@ COSTS = ("run", "case", "estimator", "frames", "observations", "seconds", "memor
 ANSWERED = ("ok", "recovered")
 BENCH_METRICS = tuple(metric for metric in METRICS if metric.name)
 """metrics that the CSV tables of a bench have as columns"""
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """An input file of a job."""
+
+    path: str
+    """absolute; workers on other machines need it under the same path"""
+    content: str
+    """SHA-256"""
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A recording."""
+
+    recording: File
+    truth: File | None = None
+    truth_frame: Literal["camera", "imu"] | None = None
+    repairs: File | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """A simulated drive."""
+
+    settings: Mapping[str, Any]
+    """settings of `Simulation`, without the seed"""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """Job of a bench: all inputs that determine the results of one run."""
+
+    source: Recorded | Simulated
+    seed: int
+    preset: Literal["calibrated", "documented"]
+    features: int | Literal["all"] | None
+    noise: str | Mapping[str, float]
+    """`estimated`, `assumed`, or standard deviations by name"""
+    landmarks: Literal["in-turn", "held"]
+    held_out: float
+    estimators: tuple[str, ...]
+    page: Literal["none", "tables", "figures"]
+    code: str
+    """hash of the code that the job runs"""
+
+    @property
+    def key(self) -> str:
+        """Cache key: the same for the same content, settings and code, whatever the paths of files."""
+        content = asdict(self)
+        for file in content["source"].values():
+            if isinstance(file, dict):
+                file.pop("path", None)
+        content["kind"] = type(self.source).__name__
+        return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()[:20]
+
+    def record(self) -> dict[str, str | int | float | bool | None]:
+        """The settings for `summary.json` of the run."""
+        if isinstance(self.source, Recorded):
+            source = {"sequence": self.source.recording.path}
+        else:
+            source = {"sequence": "simulated", **{name: str(value) for name, value in self.source.settings.items()}}
+        return {
+            **source,
+            "preset": self.preset,
+            "estimators": ",".join(self.estimators),
+            "features": self.features or "the preset's default",
+            "noise": self.noise if isinstance(self.noise, str) else json.dumps(dict(self.noise)),
+            "landmarks": self.landmarks,
+            "seed": self.seed,
+            "held_out": self.held_out,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """A job with its names in tables."""
+
+    job: Job
+    case: str
+    """sequence and settings: the jobs of a case differ only in the seed"""
+    sequence: str
+    settings: Mapping[str, str]
+    """settings that vary over the suite, as text"""
+    work: float
+    """number of observations, to predict the remaining time"""
+    has_seed: bool
+
+    @property
+    def name(self) -> str:
+        """Name of the run, unique in the suite."""
+        return f"{self.case} seed={self.job.seed}" if self.has_seed else self.case
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -131,7 +225,7 @@ def consistency(results: Results) -> pd.DataFrame:
             if columns is None:
                 continue
             found = compare.anees_summary(columns)
-            rows.append({"case": case, "estimator": name, **found._asdict(), "verdict": _judged(found)})
+            rows.append({"case": case, "estimator": name, **found._asdict(), "verdict": found.verdict})
     return pd.DataFrame(rows)
 
 
@@ -181,11 +275,3 @@ def _least(trust: pd.Series) -> str:
     """The worst trust in the references of several runs."""
     found = set(trust.dropna())
     return next((word for word in ("untrusted", "doubtful", "trusted") if word in found), "")
-
-
-def _judged(found: compare.AneesSummary) -> str:
-    if not np.isfinite(found.anees):
-        return ""
-    if found.anees > found.high:
-        return "overconfident"
-    return "conservative" if found.anees < found.low else "consistent"

@@ -21,9 +21,8 @@ from fgbaseline.data import (
 )
 from fgbaseline.data.dataframes import as_cell_value
 from fgbaseline.data.estimator_runner import no_progress
-from fgbaseline.data.formats.file_errors import FilePath
+from fgbaseline.data.formats.file_errors import FilePath, as_path
 
-from ..comparison.opening import as_path
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
 from ..phrases.run import verdict
 from ..python_interface import NotebookResult, for_python, write_report

@@ -9,7 +9,7 @@ import numpy as np
 
 from fgbaseline.compare.estimate_comparison import Run, compare_all, reference_among
 from fgbaseline.compare.trajectory_comparison.computation import matched_poses
-from fgbaseline.compare.trajectory_comparison.conventions import Source, resolve
+from fgbaseline.compare.trajectory_comparison.conventions import Source
 from fgbaseline.compare.trajectory_comparison.reprojection import up_of_problem
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Estimate, Excluded, HeldOut, Problem, Trajectory, find_estimator
@@ -17,7 +17,7 @@ from fgbaseline.data.estimator_runner import Watch, no_progress, solve_all
 from fgbaseline.data.triangulate_landmarks import landmarks_along
 from fgbaseline.geometry import InputError
 
-from ..comparison.inputs import frame_times, in_one_body, valid_file_name
+from ..comparison.inputs import in_one_body, valid_file_name
 from ..comparison.sources import opened
 from .settings import RunSettings
 
@@ -97,8 +97,7 @@ def _aligned(
     of a run. Landmarks are triangulated along it. Raises InputError where it cannot be paired.
     """
     there = Trajectory.of_frames(problem.sequence.t, reference.world_T_imu, reference.name)
-    every = resolve([there, source], frame_times(settings, problem), settings)
-    first, entry = in_one_body(every, settings, problem, None)
+    first, entry = in_one_body([there, source], settings, problem)
     if not entry.trajectory.oriented:
         raise InputError(f"{name} has positions only; fgbaseline compare takes it")
     up = up_of_problem(problem, entry.trajectory.later(settings.offset) if settings.offset else entry.trajectory)

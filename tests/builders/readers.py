@@ -18,7 +18,7 @@ from fgbaseline.data.formats import read_euroc, read_landmarks, read_times, read
 from fgbaseline.data.formats.trajectory_reader import read_pose_covariances
 from fgbaseline.data.problem_export import read_problem, write_problem
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.accuracy_check.limits_file import read_limits
+from fgbaseline.reports.accuracy_check.limits import read_limits
 from fgbaseline.reports.comparison.reference_run import read_reference_run
 from fgbaseline.reports.results.reader import read_folder, read_measured
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from fgbaseline.reports.accuracy_check.command import Outputs, check
-from fgbaseline.reports.accuracy_check.limits_file import read_limits
+from fgbaseline.reports.accuracy_check.limits import read_limits
 from fgbaseline.reports.results.reader import read_folder
 
 NULLS = {"rmse": None, "max": None}

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from fgbaseline import compare
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.geometry import FloatArray
-from fgbaseline.reports.formatting import number
 from fgbaseline.reports.phrases.bench import winner
-from fgbaseline.reports.phrases.run_accuracy import ate_sentences, divergence_sentences, is_claimed
+from fgbaseline.reports.phrases.evidence import held_out_sentences
+from fgbaseline.reports.phrases.run_accuracy import ate_sentences, divergence_sentences
 from fgbaseline.reports.results.bench import BENCH_METRICS
 from fgbaseline.reports.tables.run import main_table
 
@@ -102,8 +102,8 @@ def test_a_difference_below_one_percent_is_not_claimed() -> None:
     larger, smaller = 0.004617, 0.004605  # printed as 0.00462 and 0.00461
     d = compare.rmse_difference(np.full(100, larger), np.full(100, smaller))
     assert d.settled
-    assert not is_claimed(d, larger, smaller)
-    assert is_claimed(d, 1.02 * smaller, smaller)
+    assert not compare.is_claimed(d, larger, smaller)
+    assert compare.is_claimed(d, 1.02 * smaller, smaller)
     errors = {"isam2": np.full(FRAMES, larger), "ekf": np.full(FRAMES, smaller)}
     said = ate_sentences(run_with(errors, errors))
     assert said[1:] == ["The ATE of ekf and isam2 is the same within 1 %: not ranked."]
@@ -154,13 +154,28 @@ def test_a_bench_claims_the_least_error_only_where_runs_separate_it(seed: int, r
     separated = []
     for name in whole:
         interval = compare.mean_interval((table[name] - table[first]).to_numpy())
-        if name != first and interval.low > 0.0 and number(float(means[name])) != number(float(means[first])):
+        if name != first and interval.low > 0.0 and means[name] > 1.01 * means[first]:
             separated.append(name)
     assert claims == (len(whole) > 1 and len(separated) == len(whole) - 1 and runs > 1)
     if claims:
         assert f"smallest ATE {first} " in sentence
     larger = sentence.partition("larger, by the paired interval: ")[2].partition(";")[0]
     assert [name for name in whole if f"{name} " in larger] == (separated if runs > 1 else [])
+
+
+@pytest.mark.parametrize(("larger", "is_larger"), [(1.009, False), (1.011, True)])
+def test_runs_bench_and_held_out_tracks_claim_from_the_same_difference_on(larger: float, is_larger: bool) -> None:
+    errors = {"isam2": np.full(FRAMES, larger), "ekf": np.full(FRAMES, 1.0)}
+    assert any("larger ATE" in s for s in ate_sentences(run_with(errors, errors))) == is_larger
+
+    table = ranked(a=[1.0, 1.1, 0.9], b=[larger, 1.1 * larger, 0.9 * larger])
+    assert table["tied"].tolist() == [True, not is_larger]
+    assert winner("drive", table, ATE, frozenset()).startswith("drive: smallest ATE a ") == is_larger
+    fewer = ranked(a=[1.0, 1.0, 9.0], b=[larger, 1.001 * larger, np.nan])  # compared over the runs that both have
+    assert fewer["tied"].tolist() == [True, not is_larger]
+
+    held_out = pd.DataFrame({"median": [1.0, larger], "behind_low": [0.0, 1e-3]}, index=["a", "b"])
+    assert (len(held_out_sentences(held_out, "the tracks")) == 1) == is_larger
 
 
 def test_one_run_ranks_no_estimator_and_missing_estimates_are_named() -> None:

@@ -17,7 +17,7 @@ from fgbaseline.data import Trajectory
 from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.phrases.bench import winner
-from fgbaseline.reports.phrases.position_errors import significance_sentences
+from fgbaseline.reports.phrases.evidence import significance_sentences
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.bench import BENCH_METRICS
 from fgbaseline.reports.tables.run import main_table

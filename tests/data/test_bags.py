@@ -16,7 +16,7 @@ from fgbaseline.data.tracking import ImageOptions, track
 from fgbaseline.data.tracking.sources import open_recording
 from fgbaseline.data.tracking.sources.image_recording import TruthFile
 from fgbaseline.geometry import FloatArray, InputError, so3
-from fgbaseline.reports.cli.main import group
+from fgbaseline.reports.cli import group
 
 from ..builders.rendered import IMU_YAML, Room, camchain_yaml
 

@@ -16,7 +16,7 @@ from fgbaseline.data.tracking import ImageOptions, TrackerSettings, track
 from fgbaseline.data.tracking.pipeline import opened_images, track_images
 from fgbaseline.data.tracking.sources import ImageRecording, open_recording
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.cli.main import group
+from fgbaseline.reports.cli import group
 
 from ..builders.rendered import CAMERA, IMU_T_CAM, START_NS, Room, camchain_yaml, displaced, sensor_yaml
 

@@ -14,7 +14,7 @@ from fgbaseline.data.tracking.rectification import CameraModel, Distortion, rect
 from fgbaseline.data.tracking.sources import open_recording
 from fgbaseline.geometry import FloatArray, InputError, MonocularCamera, se3
 from fgbaseline.geometry.monocular_camera import left_of
-from fgbaseline.reports.cli.main import group
+from fgbaseline.reports.cli import group
 
 from ..builders.rendered import CAMERA, IMU_T_CAM, START_NS, Room, camchain_yaml
 

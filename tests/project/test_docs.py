@@ -19,7 +19,7 @@ import pytest
 from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import se3
-from fgbaseline.reports.cli.main import COMMANDS, group
+from fgbaseline.reports.cli import COMMANDS, group
 
 from ..builders.commands import environment
 from ..builders.documents import DOCUMENTS, ROOT, Block, blocks, commands, file_name, inline, name, shown

@@ -11,7 +11,7 @@ from fgbaseline.compare import Verdict
 from fgbaseline.geometry import se3
 from fgbaseline.reports import comparison
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
-from fgbaseline.reports.accuracy_check.limits_file import read_limits
+from fgbaseline.reports.accuracy_check.limits import read_limits
 from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.phrases.run_accuracy import ate_sentences

@@ -14,19 +14,17 @@ from rich.progress import Progress
 
 from fgbaseline.data import write_npz
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.reports.bench.executors import outcomes, processes
-from fgbaseline.reports.bench.job import Planned
+from fgbaseline.reports.bench.command import BarDisplay
+from fgbaseline.reports.bench.executors import FileChannel, ProgressEvent, outcomes, processes
+from fgbaseline.reports.bench.folder import collect_results, open_cache, render
 from fgbaseline.reports.bench.plan import plan
-from fgbaseline.reports.bench.progress import BarDisplay, FileChannel, ProgressEvent, duration
-from fgbaseline.reports.bench.report import collect_results, render
-from fgbaseline.reports.bench.run_cache import open_cache
 from fgbaseline.reports.bench.suite import read_suite
 from fgbaseline.reports.bench.worker import Outcome, work
 from fgbaseline.reports.figures.bench import draw
 from fgbaseline.reports.formatting import unbroken
-from fgbaseline.reports.phrases.bench import sentences
+from fgbaseline.reports.phrases.bench import duration, sentences
 from fgbaseline.reports.results import bench as tables
-from fgbaseline.reports.results.bench import Results
+from fgbaseline.reports.results.bench import Planned, Results
 from fgbaseline.reports.tables.bench import main_table
 from fgbaseline.reports.tables.writers import latex, markdown
 

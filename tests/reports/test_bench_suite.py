@@ -9,10 +9,10 @@ import pytest
 from fgbaseline.data import write_npz
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import InputError
-from fgbaseline.reports.bench import job as jobs
-from fgbaseline.reports.bench.job import Planned
+from fgbaseline.reports.bench import worker
 from fgbaseline.reports.bench.plan import plan
 from fgbaseline.reports.bench.suite import read_suite
+from fgbaseline.reports.results.bench import Planned
 
 from ..builders.benches import N_RUNS, SUITE, written
 
@@ -155,15 +155,15 @@ def test_a_change_to_our_source_makes_it_another_job_and_one_to_the_reports_page
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rooms = {}
-    for room in (*(f"fgbaseline.{name}" for name in jobs.ROOMS), "fgbaseline.reports"):
+    for room in (*(f"fgbaseline.{name}" for name in worker.ROOMS), "fgbaseline.reports"):
         rooms[room] = tmp_path / room
         (rooms[room] / "bench").mkdir(parents=True)
         (rooms[room] / "html").mkdir()
-        for name in ("bench/worker.py", "bench/job.py", "html/table.py", "filter.py"):
+        for name in ("bench/worker.py", "html/table.py", "filter.py"):
             (rooms[room] / name).write_text("x = 1\n")
         (rooms[room] / "figures").mkdir()
-    monkeypatch.setattr(jobs, "_folder", rooms.__getitem__)
-    code: Callable[[bool], str] = lambda pages: jobs.code_hash.__wrapped__(("ekf",), pages)  # noqa: E731
+    monkeypatch.setattr(worker, "_folder", rooms.__getitem__)
+    code: Callable[[bool], str] = lambda pages: worker.code_hash.__wrapped__(("ekf",), pages)  # noqa: E731
     before = code(False), code(True)
     (rooms["fgbaseline.reports"] / "html" / "table.py").write_text("x = 2\n")
     assert code(False) == before[0]

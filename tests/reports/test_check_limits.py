@@ -15,7 +15,7 @@ from fgbaseline.data.finding import AS_GIVEN, UNITS
 from fgbaseline.data.toml_file import TomlFile
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
-from fgbaseline.reports.accuracy_check.limits_file import Limits, read_limits
+from fgbaseline.reports.accuracy_check.limits import Limits, read_limits
 from fgbaseline.reports.phrases.check import remarks
 from fgbaseline.reports.results.check import Checked, Line
 from fgbaseline.reports.results.reader import read_folder, read_measured

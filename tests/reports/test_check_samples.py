@@ -15,7 +15,7 @@ from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.accuracy_check import assert_accuracy
 from fgbaseline.reports.accuracy_check.command import Outputs
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
-from fgbaseline.reports.accuracy_check.limits_file import read_limits
+from fgbaseline.reports.accuracy_check.limits import read_limits
 from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.results.reader import metrics_of, read_folder, sample_of

@@ -21,7 +21,7 @@ from fgbaseline import data, ekf
 from fgbaseline.data import Estimate, Problem, Sequence
 from fgbaseline.data.problem_export import write_problem
 from fgbaseline.geometry import InputError, se3
-from fgbaseline.reports.cli.main import COMMANDS
+from fgbaseline.reports.cli import COMMANDS
 from fgbaseline.reports.comparison import ComparisonReport
 from fgbaseline.reports.python_interface import in_python
 from fgbaseline.reports.run.api import RunReport, named_estimators

@@ -15,8 +15,14 @@ from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.data.velocity_increments import dead_reckoned_path, increments
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.reproduction.experiments import FilterSettings, run_filter
-from fgbaseline.reports.reproduction.recordings import TRACKS_PER_FRAME, paper_recording, read_subjects, stand_in
-from fgbaseline.reports.reproduction.repair_ablation import diagnosed_stages, simulated_stages
+from fgbaseline.reports.reproduction.recordings import (
+    TRACKS_PER_FRAME,
+    diagnosed_stages,
+    paper_recording,
+    read_subjects,
+    simulated_stages,
+    stand_in,
+)
 
 from ..builders.commands import everything_in, fgbaseline
 

@@ -8,7 +8,7 @@ import pytest
 
 from fgbaseline.data import Observations, Sequence, read, read_problem
 from fgbaseline.geometry import StereoCamera
-from fgbaseline.reports.phrases.tracks import track_sentences
+from fgbaseline.reports.phrases.run import track_sentences
 
 from ..builders.commands import fgbaseline
 from ..builders.rendered import HEIGHT, WIDTH, Room
