@@ -11,11 +11,10 @@ from matplotlib.figure import Figure
 from fgbaseline.geometry import FloatArray
 
 from ..figures.bench import draw
-from ..figures.palette import colors
-from ..figures.saving import encoded
+from ..figures.drawing import encoded
+from ..figures.style import colors
 from ..formatting import counted
-from ..html.page import Grid, Note, Page, Section, folded, pictures
-from ..html.rendering import render_page
+from ..html.page import Grid, Note, Page, Section, folded, pictures, render_page
 from ..phrases.bench import FIGURES, TABLE, sentences
 from ..results import bench as statistics
 from ..results.bench import ANSWERED, BENCH_METRICS, COSTS, OF_THE_RUN, Results

@@ -113,7 +113,7 @@ class ComparisonReport(NotebookResult, Comparison):
         from fgbaseline.data.parallel import cores
 
         from ..figures.comparison import drawn_in_background
-        from ..figures.saving import save
+        from ..figures.drawing import save
 
         with drawn_in_background(self, cores()) as drawn:
             from ..html.comparison_page import render  # while the figures are drawn

@@ -18,18 +18,13 @@ from fgbaseline.compare.statistics.descriptive import without_nan
 from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
 
-from .axis_limits import common_window
 from .comparison_data import ComparisonData, of_comparison
-from .drawing import Captioned, DrawOne, drawn, drawn_for_paper, encoded_in_background
-from .evidence import map_difference, three_sigma
-from .legend import swatch, title_and_legend
-from .over_time import TITLE_ROOM, columns, component_panels
-from .palette import GRAY, TRUTH
-from .panels import few_ticks, fit_log_or_linear
-from .paths import frame_top_view
-from .reprojection import distribution
-from .saving import EncodedFigure
-from .style import SCREEN, WHITE, Style, in_style, safe_text, stacked_panels
+from .drawing import Captioned, DrawOne, EncodedFigure, drawn, drawn_for_paper, encoded_in_background
+from .layout import title_and_legend
+from .over_time import TITLE_ROOM, three_sigma
+from .panels import columns, common_window, component_panels, few_ticks, fit_log_or_linear, frame_top_view, swatch
+from .residuals import distribution, map_difference
+from .style import GRAY, SCREEN, TRUTH, WHITE, Style, in_style, safe_text, stacked_panels
 
 if TYPE_CHECKING:
     import pandas as pd

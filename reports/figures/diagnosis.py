@@ -15,9 +15,9 @@ from fgbaseline.diagnosis.repairs.significance import significant_bias
 from fgbaseline.geometry import FloatArray
 
 from .drawing import DrawOne, drawn
-from .legend import swatch, title_and_legend
-from .palette import GRAY
-from .style import SCREEN, stacked_panels
+from .layout import title_and_legend
+from .panels import swatch
+from .style import GRAY, SCREEN, stacked_panels
 
 SEEN, RECORDED, REPAIRED = "#111111", "#D55E00", "#0072B2"
 """the cameras, the recording and what the repair makes of it"""

@@ -1,4 +1,4 @@
-"""Paths from above: over one another, side by side, and each with its landmarks."""
+"""Paths from above: over one another, side by side, and each with its landmarks; and their height over time."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +11,21 @@ from fgbaseline.data.top_view import TopView
 from fgbaseline.data.wording import distance, plural
 from fgbaseline.geometry import FloatArray
 
-from .axis_limits import Window, common_window, known, robust_window
-from .legend import note, swatch, title_and_legend
-from .palette import GRAY, LANDMARK, TRUTH
+from .layout import title_and_legend
+from .panels import (
+    Window,
+    common_window,
+    frame_top_view,
+    known,
+    note,
+    note_out_of_range,
+    plot_series,
+    robust_window,
+    swatch,
+    time_axis,
+)
 from .run_data import RunData
-from .style import SCREEN, WHITE, Style, label, safe_text
+from .style import GRAY, LANDMARK, SCREEN, TRUTH, WHITE, Style, label, safe_text, stacked_panels
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Run
@@ -29,12 +39,8 @@ ASPECT = (0.42, 1.1)
 PAPER_ASPECT, PAPER_SURROUNDINGS = (0.35, 1.2), (20.0, 0.15)
 MIN_MARGIN = 0.5
 """m of a margin, at least"""
-
-
-def frame_top_view(axes: Axes, box: Window, x: str = "", y: str = "") -> None:
-    """Frames a panel: equal scales, the box and the labels of its axes."""
-    (left, bottom), (right, top) = box.low, box.high
-    axes.set(aspect="equal", adjustable="box", xlim=(left, right), ylim=(bottom, top), xlabel=x, ylabel=y)
+MIN_HEIGHT_RANGE = 0.1
+"""height over extent, up to which any path is shown"""
 
 
 def paths_overlaid(run: RunData, style: Style = SCREEN) -> Figure:
@@ -119,6 +125,24 @@ def paths_side_by_side(run: RunData) -> Figure:
         axes.set_visible(False)
     apart = f", and the greatest distance of each from {safe_text(run.reference)}" if run.reference is not None else ""
     title_and_legend(figure, f"Trajectories from above, side by side{apart}", [*behind, *ends])
+    return figure
+
+
+def height(run: RunData) -> Figure:
+    """Height above the start over time."""
+    heights = {name: path[:, 2] for name, path in run.paths.items()}
+    true = None if run.truth is None else run.truth[:, 2]
+    figure, (axes,) = stacked_panels(3.4)
+    handles = axes.plot(run.t, true, **SCREEN.truth) if true is not None else []
+    handles += plot_series(axes, run.t, heights, run.line())
+    least = MIN_HEIGHT_RANGE * common_window(run.paths.values(), run.truth).side
+    box = common_window([h[:, None] for h in heights.values()], None if true is None else true[:, None], least)
+    box = box.grown(0.06 * box.side + 0.05)
+    low, high = float(box.low[0]), float(box.high[0])
+    axes.set(ylim=(low, high), ylabel="height, m")
+    note_out_of_range(axes, run.t, heights, low, high)
+    time_axis([axes], run.t)
+    title_and_legend(figure, "Height above the start", handles)
     return figure
 
 

@@ -21,10 +21,9 @@ from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import meters
-from .axis_limits import Window, common_window, known, robust_window
 from .drawing import DrawOne, drawn
-from .legend import note, swatch, title_and_legend
-from .paths import frame_top_view
+from .layout import title_and_legend
+from .panels import Window, common_window, frame_top_view, known, note, robust_window, swatch
 from .style import SCREEN, safe_text
 
 if TYPE_CHECKING:

@@ -7,14 +7,27 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from .drawing import Captioned, DrawOne, drawn, drawn_for_paper, encoded_in_background
-from .evidence import consistency, held_out, map_difference, nees, three_sigma, velocity_and_biases
-from .over_time import divergence, error_to_truth, height, time_per_frame
+from .drawing import Captioned, DrawOne, EncodedFigure, drawn, drawn_for_paper, encoded_in_background
+from .over_time import (
+    consistency,
+    divergence,
+    error_to_truth,
+    nees,
+    three_sigma,
+    time_per_frame,
+    velocity_and_biases,
+)
 from .panels import smoothed
-from .paths import estimator_with_landmarks, path_with_landmarks, paths_overlaid, paths_side_by_side
-from .reprojection import image_regions, reprojection_classes, reprojection_distribution, reprojection_over_time
+from .paths import estimator_with_landmarks, height, path_with_landmarks, paths_overlaid, paths_side_by_side
+from .residuals import (
+    held_out,
+    image_regions,
+    map_difference,
+    reprojection_classes,
+    reprojection_distribution,
+    reprojection_over_time,
+)
 from .run_data import RunData, of_run
-from .saving import EncodedFigure
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Run

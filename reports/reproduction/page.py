@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from fgbaseline.data.wording import plural
 
 from ..formatting import meters, number, per_cent
-from ..html.page import Block, Grid, Note, Page, Pair, Section, pictures
-from ..html.rendering import render_page
+from ..html.page import Block, Grid, Note, Page, Pair, Section, pictures, render_page
 from ..results.glossary import INERTIAL_TERMS, TERMS
 from ..tables.table import Column, Row, Table, numbers, words
 from .claims import Claim, Verdict
