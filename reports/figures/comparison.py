@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fgbaseline.compare import MatchedTrajectories
-from fgbaseline.compare.column_tables import Columns
 from fgbaseline.compare.statistics.descriptive import without_nan
 from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
@@ -128,7 +127,11 @@ def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     handles: list[Any] = []
     for row, (delta, motions) in zip(panels, data.relative.items(), strict=True):
         for panel, column, unit in zip(row, ("translation", "rotation_deg"), ("m", "°"), strict=True):
-            handles += _boxes(panel, names, data.colors, motions, column)
+            for name, table in motions.items():
+                handles += _box(panel, names.index(name), without_nan(table[column]), data.colors[name])
+            panel.set_yticks(range(len(names)), [safe_text(name) for name in names])
+            panel.set_ylim(len(names) - 0.5, -0.5)
+            panel.grid(axis="y", visible=False)
             panel.set(xlabel=f"over {delta}: {column.removesuffix('_deg')}, {unit}", xlim=(0.0, None))
     over = " and ".join(data.relative)
     legend = handles[:2] if style.titled else []
@@ -136,21 +139,11 @@ def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     return figure
 
 
-def _boxes(
-    panel: Axes, names: list[str], color: Mapping[str, str], motions: Mapping[str, Columns], column: str
-) -> list[Any]:
-    """Draws a box for each of the names; gives the legend's handles of median and RMSE."""
-    handles: list[Any] = []
-    for name, table in motions.items():
-        handles += _box(panel, names.index(name), without_nan(table[column]), color[name])
-    panel.set_yticks(range(len(names)), [safe_text(name) for name in names])
-    panel.set_ylim(len(names) - 0.5, -0.5)
-    panel.grid(axis="y", visible=False)
-    return handles
-
-
 def _box(panel: Axes, y: float, values: FloatArray, color: str) -> list[Any]:
-    """Horizontal box at a height, as `Axes.boxplot` has it, which imports pyplot and makes more artists."""
+    """Draws a horizontal box at a height, as `Axes.boxplot` has it, which imports pyplot and makes more artists.
+
+    Gives the legend's handles of median and RMSE.
+    """
     (at,) = boxplot_stats(values, whis=(5, 95))
     low, q1, median, q3, high, apart = (*(at[key] for key in ("whislo", "q1", "med", "q3", "whishi")), np.nan)
     box = Rectangle((q1, y - BOX / 2), q3 - q1, BOX, zorder=2.0, facecolor=color, alpha=0.45, edgecolor=color)
@@ -194,11 +187,11 @@ EACH: Captioned = {
 
 def _reprojection(comparison: "Comparison", data: ComparisonData) -> Figure | None:
     """Share of the observations that each path explains to within so many pixels; None without observations."""
-    known = {name: p for name, p in comparison.pixels.items() if p.along is not None and len(p.along)}
-    if not known:
+    pixels = comparison.pixels
+    along = {name: p.along["error"] for name, p in pixels.items() if p.along is not None and len(p.along)}
+    own = {name: p.own["error"] for name, p in pixels.items() if name in along and p.own is not None and len(p.own)}
+    if not along:
         return None
-    along = {name: p.along["error"] for name, p in known.items() if p.along is not None}
-    own = {name: p.own["error"] for name, p in known.items() if p.own is not None and len(p.own)}
     labels = ["triangulated along the trajectory", *(["its own landmarks"] if own else [])]
     return distribution(along, own, data.line(), labels)
 

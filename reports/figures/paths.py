@@ -188,9 +188,8 @@ def _panels(box: Window, rows: int, columns: int) -> tuple[Figure, list[Axes]]:
 
 
 def _draw_landmarks(axes: Axes, landmarks: FloatArray, size: float = 3.0) -> Line2D:
-    axes.scatter(
-        landmarks[:, 0], landmarks[:, 1], s=size, color=LANDMARK, linewidths=0, alpha=0.7, rasterized=True, zorder=1.5
-    )
+    x, y = landmarks.T
+    axes.scatter(x, y, s=size, color=LANDMARK, linewidths=0, alpha=0.7, rasterized=True, zorder=1.5)
     return swatch(LANDMARK, plural(len(landmarks), "landmark"))
 
 

@@ -20,7 +20,7 @@ from ..formatting import counted, distance, listed, number
 from ..phrases.comparison import verdict
 from ..results.comparison import Summary
 from ..tables.comparison import comparison_table
-from ..tables.table import Row
+from ..tables.table import Cell
 from .page import Folded, Grid, Live, Page, Section, figure_blocks, pictures, render_page, still_figures, trust
 from .plot_encoding import Chart, Lines, chart, expected, floats, grouped, integers, numbered, position_covariances
 
@@ -63,7 +63,11 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
     reference, estimates, data = summary.reference, summary.estimates, of_comparison(comparison)
     table = comparison_table(comparison, summary.by_name, summary.caption, mark_reference=True)
     drawn = pictures(figures, CAPTIONS)
-    notes = {name: estimate.notes for name, estimate in estimates.items() if estimate.notes}
+    missing = {
+        f"{name}: {ABSENT.get(key, key.replace('_', ' '))}": why
+        for name, estimate in estimates.items()
+        for key, why in estimate.notes.items()
+    }
     sources = {reference.name: reference.source, **{name: estimate.source for name, estimate in estimates.items()}}
     bands = [p for name, p in drawn.items() if name.startswith("three_sigma_")]
     beyond = [p for name, p in drawn.items() if not name.startswith((*STILLS, "growth", "three_sigma_"))]
@@ -73,7 +77,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
             table,
             name="metric",
             caption=f"{table.caption} {BEST[comparison.ranking.same]}",
-            rows=tuple(_with_intervals_below(row) for row in table.rows),
+            rows=tuple(replace(row, cells=tuple(map(_with_interval_below, row.cells))) for row in table.rows),
         )
     )
     behind = None if reference.trust is None else trust(reference.name, reference.trust, reference.reasons)
@@ -87,19 +91,11 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
             table=Section("table", "Metrics by estimate", [grid], "Metrics"),
             sections=[
                 Section("behind", "Trust in the reference", [behind] if behind is not None else []),
-                Section(
-                    "over-time",
-                    "Over time",
-                    [Live("charts"), *figure_blocks(drawn, ["growth"])],
-                ),
-                Section(
-                    "evidence",
-                    _beyond_title(drawn, bool(bands)),
-                    [*beyond, *folded],
-                ),
+                Section("over-time", "Over time", [Live("charts"), *figure_blocks(drawn, ["growth"])]),
+                Section("evidence", _beyond_title(drawn, bool(bands)), [*beyond, *folded]),
                 Section("stills", "Static figures", [still_figures(stills)] if stills else []),
             ],
-            settings={"Missing values": _named(notes), "Files": sources, "Settings": settings},
+            settings={"Missing values": missing, "Files": sources, "Settings": settings},
             colors=data.colors,
             plots=comparison_plots(comparison, data),
             still_paths=drawn.get("paths"),
@@ -127,15 +123,9 @@ def _beyond_title(names: Iterable[str], has_bands: bool) -> str:
     return title[:1].upper() + title[1:]
 
 
-def _named(notes: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
-    """The notes of all estimates, by estimate and the words for their keys."""
-    every = ((name, key, why) for name, of in notes.items() for key, why in of.items())
-    return {f"{name}: {ABSENT.get(key, key.replace('_', ' '))}": why for name, key, why in every}
-
-
-def _with_intervals_below(row: Row) -> Row:
-    """The row with each interval on a line below its value."""
-    return replace(row, cells=tuple(cell._replace(text=cell.text.replace(" [", "\n[")) for cell in row.cells))
+def _with_interval_below(cell: Cell) -> Cell:
+    """Cell with its interval on a line below its value."""
+    return cell._replace(text=cell.text.replace(" [", "\n["))
 
 
 def comparison_plots(comparison: Comparison, data: ComparisonData) -> dict[str, Any]:

@@ -19,10 +19,9 @@ FINEST = 16
 
 def floats(values: ArrayLike) -> str:
     """Single precision; NaN for what is not finite."""
-    array = np.asarray(values, dtype=np.float64)
     with np.errstate(over="ignore"):
-        single = np.where(np.isfinite(array), array, np.nan).astype("<f4")
-    return _text(np.where(np.isfinite(single), single, np.nan).astype("<f4"))
+        single = np.asarray(values, dtype=np.float64).astype("<f4")
+    return _text(np.where(np.isfinite(single), single, np.float32(np.nan)))
 
 
 def integers(values: ArrayLike, bits: int = 32) -> str:
