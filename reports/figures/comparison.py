@@ -228,17 +228,13 @@ def draw_failed_check(
 
 
 def _aligned_paths(axes: Axes, aligned: MatchedTrajectories) -> None:
-    plane = widest_plane(aligned.reference.position)
-    here = aligned.reference.position @ plane
+    reference = aligned.reference.position
+    _, _, Vt = np.linalg.svd(reference - reference.mean(axis=0), full_matrices=True)
+    plane = Vt[:2].T  # in which the reference spreads most
+    here = reference @ plane
     axes.plot(*here.T, color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.8, label=safe_text(aligned.reference.name))
     axes.plot(*(aligned.estimate.position @ plane).T, color=CHECK_COLORS["ate"], label=safe_text(aligned.estimate.name))
     axes.plot(*here[0], color=TRUTH, marker="o", linestyle="none", label="start")
     title = f"in the plane in which {safe_text(aligned.reference.name)} is widest, aligned"
     axes.set(aspect="equal", adjustable="datalim", xlabel="m", ylabel="m", title=title)
     axes.legend()
-
-
-def widest_plane(positions: FloatArray) -> FloatArray:
-    """Orthonormal directions (3, 2) in which positions (n, 3) spread most."""
-    _, _, Vt = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=True)
-    return np.asarray(Vt[:2].T)

@@ -13,19 +13,18 @@ from importlib.resources import files
 from itertools import groupby
 from typing import Any
 
-import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ..figures.drawing import EncodedFigure, encoded
-from ..figures.style import DASHES, TRUTH, dark_matrix, on_dark
+from ..figures.style import TRUTH, dark_matrix
 from ..formatting import counted, unbroken
 from ..phrases.evidence import FIRST
 from ..results.glossary import TERMS, WORDS
 from ..results.provenance import creation
 from ..tables.table import Table
-from .plot_encoding import TRUTH_LINE, embedded_json
+from .plot_encoding import TRUTH_LINE, embedded_json, line_rules
 
 LARGEST_SVG = 200_000
 """bytes, from which on the PNG takes its place"""
@@ -189,23 +188,20 @@ def render_page(page: Page) -> str:
     """HTML of a page: one file that needs no other and makes no request. All text that comes from files is escaped."""
     plots, keys = page.plots, {name: str(i) for i, name in enumerate(page.colors)}
     titles = {title: key for name, key in keys.items() for title in (name, f"{name} (reference)")}
-    return (
-        environment()
-        .get_template("page.html")
-        .render(
-            page=page,
-            most=FIRST,
-            sections=[section for section in (page.table, *page.sections) if section.blocks],
-            css=Markup(asset("report.css") + (asset("explore.css") if page.colors else "")),
-            dark_matrix=" ".join(f"{value:g}" for row in dark_matrix() for value in (*row[:3], 0, row[3])),
-            glossary={**TERMS, **WORDS},
-            terms=_terms(page),
-            line_rules=line_rules({**{keys[name]: color for name, color in page.colors.items()}, TRUTH_LINE: TRUTH}),
-            classes={title: f"estimator-{key}" for title, key in titles.items()},
-            policy=Markup(NO_SCRIPT) if plots is None else policy(),
-            record={**page.settings, **creation()},
-            **({} if plots is None else _interactive(plots)),
-        )
+    template = environment().get_template("page.html")
+    return template.render(
+        page=page,
+        most=FIRST,
+        sections=[section for section in (page.table, *page.sections) if section.blocks],
+        css=Markup(asset("report.css") + (asset("explore.css") if page.colors else "")),
+        dark_matrix=" ".join(f"{value:g}" for row in dark_matrix() for value in (*row[:3], 0, row[3])),
+        glossary={**TERMS, **WORDS},
+        terms=_terms(page),
+        line_rules=line_rules({**{keys[name]: color for name, color in page.colors.items()}, TRUTH_LINE: TRUTH}),
+        classes={title: f"estimator-{key}" for title, key in titles.items()},
+        policy=Markup(NO_SCRIPT) if plots is None else policy(),
+        record={**page.settings, **creation()},
+        **({} if plots is None else _interactive(plots)),
     )
 
 
@@ -288,23 +284,3 @@ def policy() -> Markup:
     """Content security policy: embedded pictures and styles, this very script, and nothing from anywhere."""
     digest = b64encode(sha256(script().encode("utf-8")).digest()).decode("ascii")
     return Markup(f"{NO_SCRIPT}; script-src 'sha256-{digest}'")  # nosec: it is our own
-
-
-def line_rules(colors: Mapping[str, str]) -> Markup:
-    """`.estimator-KEY` sets `--estimator`, `--dash` and the `--sample` of a legend by the color of its line."""
-    rules = "\n".join(f".estimator-{key} {{ {_line_style(color)} }}" for key, color in colors.items())
-    dark = "\n".join(f".estimator-{key} {{ --estimator: {on_dark(color)}; }}" for key, color in colors.items())
-    return Markup(f"{rules}\n@media screen and (prefers-color-scheme: dark) {{\n{dark}\n}}")
-
-
-def _line_style(color: str) -> str:
-    lengths = DASHES.get(color, ())
-    if not lengths:
-        return f"--estimator: {color}; --dash: none; --sample: linear-gradient(var(--estimator) 0 0);"
-    ends = np.cumsum(lengths)
-    stops = [
-        f"{'transparent' if i % 2 else 'var(--estimator)'} {end - length:g}px {end:g}px"
-        for i, (length, end) in enumerate(zip(lengths, ends.tolist(), strict=True))
-    ]
-    dash = " ".join(f"{length:g}" for length in lengths)
-    return f"--estimator: {color}; --dash: {dash}; --sample: repeating-linear-gradient(90deg, {', '.join(stops)});"
