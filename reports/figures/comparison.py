@@ -1,7 +1,6 @@
 """Figures of a comparison of trajectories, and of one that a check of accuracy failed."""
 
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,12 +17,13 @@ from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
 
 from .comparison_data import ComparisonData, of_comparison
-from .drawing import Captioned, DrawOne, EncodedFigure, drawn, drawn_for_paper, encoded_in_background
+from .drawing import Captioned, DrawOne, drawn_for_paper
 from .layout import title_and_legend
 from .over_time import TITLE_ROOM, three_sigma
-from .panels import columns, common_window, component_panels, few_ticks, fit_log_or_linear, frame_top_view, swatch
+from .panels import columns, common_window, component_panels, few_ticks, fit_log_or_linear, frame_top_view
+from .paths import overlaid
 from .residuals import distribution, map_difference
-from .style import GRAY, SCREEN, TRUTH, WHITE, Style, in_style, safe_text, stacked_panels
+from .style import SCREEN, TRUTH, Style, in_style, safe_text, stacked_panels
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,18 +46,6 @@ def figure_functions(comparison: "Comparison") -> dict[str, DrawOne]:
     return each | {f"three_sigma_{n}": partial(_three_sigma, data, r) for n, r in comparison.results.items()}
 
 
-def draw(comparison: "Comparison") -> dict[str, Figure]:
-    """Figures by name; those for which there is nothing to show are missing."""
-    return drawn(figure_functions(comparison))
-
-
-def drawn_in_background(
-    comparison: "Comparison", processes: int
-) -> AbstractContextManager[Callable[[], dict[str, EncodedFigure]]]:
-    """Begins to draw, in other processes; what it gives waits for what `draw` draws, by name, encoded."""
-    return encoded_in_background(figure_functions(comparison), processes)
-
-
 def draw_for_paper(data: ComparisonData) -> dict[str, tuple[Figure, str]]:
     """Figures of a comparison for a paper in two columns: name -> figure and caption."""
     words = {"reference": data.reference, "alignment": data.alignment, "pairs": data.pairs, "lengths": data.lengths}
@@ -66,19 +54,12 @@ def draw_for_paper(data: ComparisonData) -> dict[str, tuple[Figure, str]]:
 
 def paths(data: ComparisonData, style: Style = SCREEN) -> Figure:
     """All aligned paths over the reference's, from above."""
-    flat, line = {name: path[:, :2] for name, path in data.paths.items()}, data.line(style)
+    flat = {name: data.paths[name][:, :2] for name in (data.reference, *data.names)}
     box = common_window([flat[name] for name in data.names], flat[data.reference]).shaped(ASPECT, 1e-3)
     width, height = box.high - box.low
     figure = Figure(figsize=(style.width, (style.width - 0.6) * height / width + (1.4 if style.titled else 0.75)))
     axes = figure.subplots()
-    handles: list[Any] = []
-    for name in (data.reference, *data.names):
-        handles += axes.plot(*flat[name].T, **line(name))
-        if style.titled:
-            axes.plot(*flat[name][-1:].T, "s", color=data.colors[name], markersize=5, zorder=4)
-    start = flat[data.reference][:1]
-    handles += axes.plot(*start.T, "o", label="start of the reference", markersize=8 if style.titled else 4, **WHITE)
-    handles += [swatch(GRAY, "end")] if style.titled else []
+    handles = overlaid(axes, flat, data.line(style), style, start="start of the reference")
     frame_top_view(axes, box, *(f"{name} from the start, m" for name in data.axes[:2]))
     title_and_legend(figure, f"Trajectories from above, {data.alignment}", handles, style)
     return figure

@@ -1,5 +1,6 @@
 """Paths from above: over one another, side by side, and each with its landmarks; and their height over time."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from .panels import (
     time_axis,
 )
 from .run_data import RunData
-from .style import GRAY, LANDMARK, SCREEN, TRUTH, WHITE, Style, label, safe_text, stacked_panels
+from .style import GRAY, LANDMARK, SCREEN, TRUTH, WHITE, Line, Style, label, safe_text, stacked_panels
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Run
@@ -50,21 +51,33 @@ def paths_overlaid(run: RunData, style: Style = SCREEN) -> Figure:
     paths, truth = _flat(run)
     box = common_window(paths.values(), truth).shaped(ASPECT, MIN_MARGIN)
     figure, (axes,) = _panels(box, 1, 1)
-    line = run.line()
-    handles = axes.plot(*truth.T, **style.truth) if truth is not None else []
-    for name, path in paths.items():
-        handles += axes.plot(*path.T, **line(name))
-        axes.plot(*known(path)[-1:].T, "s", color=run.colors[name], markersize=5, zorder=4, clip_on=True)
-    if truth is not None:
-        axes.plot(*known(truth)[-1:].T, "s", color=TRUTH, markersize=5, zorder=3)
-    handles += axes.plot(0.0, 0.0, "o", markersize=8, label="start", **WHITE)
-    handles.append(swatch(GRAY, "end"))
+    handles = overlaid(axes, paths, run.line(), style, truth)
     frame_top_view(axes, box, "ahead of the start, m", "left of the start, m")
     title_and_legend(figure, "All trajectories from above", handles)
     remarks = [f"{safe_text(name)}: {remark}" for name, path in paths.items() for remark in _outside(box, path, "pose")]
     if remarks:
         note(axes, "; ".join(remarks) + " outside the panel")
     return figure
+
+
+def overlaid(
+    axes: Axes,
+    paths: Mapping[str, FloatArray],
+    line: Line,
+    style: Style,
+    truth: FloatArray | None = None,
+    start: str = "start",
+) -> list[Any]:
+    """Draws paths (n, 2) from a common start, which is named, and on the screen their ends; gives the handles."""
+    handles = axes.plot(*truth.T, **style.truth) if truth is not None else []
+    for name, path in paths.items():
+        handles += axes.plot(*path.T, **line(name))
+    for name, path in paths.items() if style.titled else ():
+        axes.plot(*known(path)[-1:].T, "s", color=line(name)["color"], markersize=5, zorder=4)
+    if truth is not None and style.titled:
+        axes.plot(*known(truth)[-1:].T, "s", color=TRUTH, markersize=5, zorder=3)
+    handles += axes.plot(0.0, 0.0, "o", markersize=8 if style.titled else 4, label=start, **WHITE)
+    return [*handles, swatch(GRAY, "end")] if style.titled else handles
 
 
 def estimator_with_landmarks(run: RunData) -> str | None:
@@ -162,12 +175,7 @@ def _paper_paths(run: RunData, style: Style, names: tuple[str, ...], points: Flo
         x, y = points[box.holds(points)].T
         axes.scatter(x, y, s=0.6, color=LANDMARK, linewidths=0, rasterized=True)
         handles.append(swatch(LANDMARK, "landmarks", 3.0))
-    if truth is not None:
-        handles += axes.plot(*truth.T, **style.truth)
-    line = run.line(style)
-    for name, path in paths.items():
-        handles += axes.plot(*path.T, **line(name))
-    handles += axes.plot(0.0, 0.0, "o", markersize=4, label="start", **WHITE)
+    handles += overlaid(axes, paths, run.line(style), style, truth)
     frame_top_view(axes, box, "ahead of the start, m", "to its left, m")
     title_and_legend(figure, "", handles, style)
     return figure

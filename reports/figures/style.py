@@ -193,11 +193,6 @@ def dark_matrix() -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(round(float(v), 4) for v in (*row, at)) for row, at in zip(linear, ink, strict=True))
 
 
-def linestyle(color: str) -> str | tuple[float, tuple[float, ...]]:
-    """Matplotlib's line style of a color."""
-    return (0.0, tuple(0.6 * length for length in DASHES[color])) if color in DASHES else "solid"
-
-
 def in_style(style: Style = SCREEN) -> AbstractContextManager[None]:
     """Context in which figures are drawn and written; the user's own settings hold again after it."""
     return rc_style.context(dict(style.settings), after_reset=True)
@@ -219,7 +214,8 @@ def lines(style: Style, colors: Mapping[str, str], reference: str | None, names:
 
     def look(name: str) -> dict[str, Any]:
         color = colors[name]
-        base: dict[str, Any] = {"color": color, "linestyle": linestyle(color), "label": label(name, reference)}
+        dashes = (0.0, tuple(0.6 * length for length in DASHES[color])) if color in DASHES else "solid"
+        base: dict[str, Any] = {"color": color, "linestyle": dashes, "label": label(name, reference)}
         if name == reference:
             return base | {"linewidth": 2.0 * style.line, "zorder": REFERENCE_ORDER}
         base |= {"linewidth": style.line, "zorder": 2.5}
