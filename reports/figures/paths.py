@@ -1,7 +1,7 @@
 """Paths from above: over one another, side by side, and each with its landmarks; and their height over time."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -27,9 +27,6 @@ from .panels import (
 )
 from .run_data import RunData
 from .style import GRAY, LANDMARK, SCREEN, TRUTH, WHITE, Line, Style, label, safe_text, stacked_panels
-
-if TYPE_CHECKING:
-    from fgbaseline.compare.estimate_comparison import Run
 
 ARROWS = 40
 """along a path"""
@@ -98,7 +95,9 @@ def path_with_landmarks(run: RunData, name: str | None, style: Style = SCREEN) -
     handles = [_draw_landmarks(axes, landmarks)] if len(landmarks) else []
     handles += axes.plot(*path.T, **run.line()(name))
     if run.run is not None:
-        handles.append(_draw_orientation(axes, path, _directions(run.run, name), run.colors[name]))
+        problem, world_R_imu = run.run.problem, run.run.results[name].estimate.world_T_imu[:, :3, :3]
+        optical_axis = TopView.of(problem).plane(world_R_imu @ problem.sequence.imu_T_cam[:3, 2])
+        handles.append(_draw_orientation(axes, path, optical_axis, run.colors[name]))
     handles += _draw_ends(axes, path)
     frame_top_view(axes, box, "ahead of the start, m", "left of the start, m")
     title_and_legend(figure, f"{label(name, run.reference)}: trajectory from above and landmarks", handles)
@@ -201,14 +200,8 @@ def _draw_landmarks(axes: Axes, landmarks: FloatArray, size: float = 3.0) -> Lin
     return swatch(LANDMARK, plural(len(landmarks), "landmark"))
 
 
-def _directions(run: "Run", name: str) -> FloatArray:
-    """Viewing directions (T, 2) of the camera from above."""
-    optical_axis = run.problem.sequence.imu_T_cam[:3, 2]
-    return TopView.of(run.problem).plane(run.results[name].estimate.world_T_imu[:, :3, :3] @ optical_axis)
-
-
 def _draw_orientation(axes: Axes, path: FloatArray, directions: FloatArray, color: str) -> Line2D:
-    """Arrows along the optical axis, at some of the frames, and their entry in the legend."""
+    """Arrows along the optical axis (T, 2), at some of the frames, and their entry in the legend."""
     there = np.flatnonzero(np.isfinite(path).all(axis=1))
     chosen = there[:: max(1, len(there) // ARROWS)]
     look: dict[str, Any] = {"scale": 32, "width": 0.0028, "headwidth": 5, "headlength": 6, "alpha": 0.75, "zorder": 3}
