@@ -34,8 +34,8 @@ ASPECT = (0.35, 1.1)
 """height over width of the plan, at least and at most"""
 BOX = 0.55
 """height of a box, of 1 from one estimate to the next"""
-CHECK_COLORS = {"ate": "#0072b2", "divergence": "#d55e00"}
-CHECK_LABELS = {"ate": "aligned", "divergence": "not aligned"}
+CHECK_ALIGNED = "#0072b2"
+CHECK_LINES = {"ate": (CHECK_ALIGNED, "aligned"), "divergence": ("#d55e00", "not aligned")}
 
 
 def figure_functions(comparison: "Comparison") -> dict[str, DrawOne]:
@@ -196,8 +196,8 @@ def draw_failed_check(
         above, below = figure.subplots(2, 1, height_ratios=(2, 1))
         _aligned_paths(above, aligned)
         for name, (table, largest) in errors.items():
-            t, color = table["t"] - table["t"].iloc[0], CHECK_COLORS[name]
-            below.plot(t, table["translation"], color=color, label=CHECK_LABELS[name])
+            color, label = CHECK_LINES[name]
+            below.plot(table["t"] - table["t"].iloc[0], table["translation"], color=color, label=label)
             if largest is not None:
                 below.axhline(largest, color=color, linestyle=(0, (4, 2)), linewidth=1.0)
         moment = "time since the first pose, s" if aligned.reference.stamped else "frame"
@@ -214,7 +214,7 @@ def _aligned_paths(axes: Axes, aligned: MatchedTrajectories) -> None:
     plane = Vt[:2].T  # in which the reference spreads most
     here = reference @ plane
     axes.plot(*here.T, color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.8, label=safe_text(aligned.reference.name))
-    axes.plot(*(aligned.estimate.position @ plane).T, color=CHECK_COLORS["ate"], label=safe_text(aligned.estimate.name))
+    axes.plot(*(aligned.estimate.position @ plane).T, color=CHECK_ALIGNED, label=safe_text(aligned.estimate.name))
     axes.plot(*here[0], color=TRUTH, marker="o", linestyle="none", label="start")
     title = f"in the plane in which {safe_text(aligned.reference.name)} is widest, aligned"
     axes.set(aspect="equal", adjustable="datalim", xlabel="m", ylabel="m", title=title)

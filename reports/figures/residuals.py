@@ -1,5 +1,4 @@
-"""Reprojection errors over time with the observations, as a distribution, by classes and by track; held-out errors;
-distances of landmarks from those of the reference."""
+"""Residuals: reprojection errors over time, by class and by track, held-out errors, and distances of landmarks."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
