@@ -33,7 +33,7 @@ from fgbaseline.data.velocity_increments import Shift
 from fgbaseline.diagnosis import AsRecordedSettings, NoiseSettings
 from fgbaseline.diagnosis.tracks.observation_mask import MaskSettings
 from fgbaseline.ekf import JointSettings, Linearization
-from fgbaseline.reports.figures.palette import ESTIMATOR_COLORS
+from fgbaseline.reports.figures.style import ESTIMATOR_COLORS
 
 FRAMES = 20
 PARTS = 5

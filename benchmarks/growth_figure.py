@@ -8,10 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 
-from fgbaseline.reports.figures.layout import lay_out
-from fgbaseline.reports.figures.legend import title_and_legend
-from fgbaseline.reports.figures.palette import ESTIMATOR_COLORS
-from fgbaseline.reports.figures.style import SCREEN, in_style
+from fgbaseline.reports.figures.layout import lay_out, title_and_legend
+from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, SCREEN, in_style
 
 from .growth import ESTIMATORS, LEAST_MB, LEAST_SECONDS, Point, exponents, of
 

@@ -22,11 +22,10 @@ from fgbaseline.data.formats.file_errors import shown
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..figures.bench import draw
-from ..figures.palette import colors
-from ..figures.saving import encoded
+from ..figures.drawing import encoded
+from ..figures.style import colors
 from ..formatting import counted
-from ..html.page import Grid, Note, Page, Section, folded, pictures
-from ..html.rendering import render_page
+from ..html.page import Grid, Note, Page, Section, folded, pictures, render_page
 from ..phrases.bench import FIGURES, TABLE, duration, sentences
 from ..results import bench as statistics
 from ..results.bench import ANSWERED, BENCH_METRICS, COSTS, OF_THE_RUN, Planned, Results

@@ -223,9 +223,9 @@ def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
     read_document(file)  # a fault is reported before matplotlib is imported
     from ..figures.comparison import draw_for_paper as draw_comparison
     from ..figures.comparison_data import of_comparison_folder
+    from ..figures.drawing import CAPTIONS, save, save_captions
     from ..figures.run import draw_for_paper as draw_run
     from ..figures.run_data import of_folder
-    from ..figures.saving import CAPTIONS, save, save_captions
     from ..figures.style import PAPER
 
     place = out or folder / "paper"

@@ -91,9 +91,10 @@ class ComparisonReport(NotebookResult, Comparison):
 
     def figures(self) -> "dict[str, Figure]":
         """The figures by name."""
-        from ..figures.comparison import draw  # matplotlib takes longer to import than a short comparison
+        from ..figures.comparison import figure_functions  # matplotlib takes longer to import than a short comparison
+        from ..figures.drawing import drawn
 
-        return {name: as_cell_value(figure) for name, figure in draw(self).items()}
+        return {name: as_cell_value(figure) for name, figure in drawn(figure_functions(self)).items()}
 
     @for_python
     def report(self, path: FilePath, *, force: bool = False) -> Path:
@@ -111,10 +112,10 @@ class ComparisonReport(NotebookResult, Comparison):
     def _fill(self, folder: Path) -> None:
         from fgbaseline.data.parallel import cores
 
-        from ..figures.comparison import drawn_in_background
-        from ..figures.saving import save
+        from ..figures.comparison import figure_functions
+        from ..figures.drawing import encoded_in_background, save
 
-        with drawn_in_background(self, cores()) as drawn:
+        with encoded_in_background(figure_functions(self), cores()) as drawn:
             from ..html.comparison_page import render  # while the figures are drawn
 
             self._fill_tables(folder)

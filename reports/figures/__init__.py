@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .diagnosis import draw_diagnosis
-    from .palette import colors
+    from .drawing import EncodedFigure, encoded, save
     from .run import draw, draw_for_paper, drawn_in_background
     from .run_data import RunData, of_folder, of_run
-    from .saving import EncodedFigure, encoded, save
+    from .style import colors
 else:
     from fgbaseline.geometry.lazy_names import lazy_names
 
@@ -15,10 +15,10 @@ else:
         __name__,
         {
             "diagnosis": "draw_diagnosis",
-            "palette": "colors",
+            "drawing": "EncodedFigure encoded save",
             "run": "draw draw_for_paper drawn_in_background",
             "run_data": "RunData of_folder of_run",
-            "saving": "EncodedFigure encoded save",
+            "style": "colors",
         },
     )
 

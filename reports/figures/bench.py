@@ -16,11 +16,10 @@ from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from .drawing import drawn
-from .legend import swatch, title_and_legend
-from .palette import BAND, GRAY, GREEN
-from .palette import colors as colors_of
-from .panels import DEGREES_OF_FREEDOM, chi_square_limits, intervals
-from .style import SCREEN, safe_text, stacked_panels
+from .layout import title_and_legend
+from .panels import DEGREES_OF_FREEDOM, chi_square_limits, intervals, swatch
+from .style import BAND, GRAY, GREEN, SCREEN, safe_text, stacked_panels
+from .style import colors as colors_of
 
 if TYPE_CHECKING:
     from fgbaseline.reports.results.bench import Results

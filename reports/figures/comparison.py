@@ -1,7 +1,6 @@
 """Figures of a comparison of trajectories, and of one that a check of accuracy failed."""
 
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,23 +12,18 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fgbaseline.compare import MatchedTrajectories
-from fgbaseline.compare.column_tables import Columns
 from fgbaseline.compare.statistics.descriptive import without_nan
 from fgbaseline.data.formats.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
 
-from .axis_limits import common_window
 from .comparison_data import ComparisonData, of_comparison
-from .drawing import Captioned, DrawOne, drawn, drawn_for_paper, encoded_in_background
-from .evidence import map_difference, three_sigma
-from .legend import swatch, title_and_legend
-from .over_time import TITLE_ROOM, columns, component_panels
-from .palette import GRAY, TRUTH
-from .panels import few_ticks, fit_log_or_linear
-from .paths import frame_top_view
-from .reprojection import distribution
-from .saving import EncodedFigure
-from .style import SCREEN, WHITE, Style, in_style, safe_text, stacked_panels
+from .drawing import Captioned, DrawOne, drawn_for_paper
+from .layout import title_and_legend
+from .over_time import TITLE_ROOM, three_sigma
+from .panels import columns, common_window, component_panels, few_ticks, fit_log_or_linear, frame_top_view
+from .paths import overlaid
+from .residuals import distribution, map_difference
+from .style import SCREEN, TRUTH, Style, in_style, safe_text, stacked_panels
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,8 +34,8 @@ ASPECT = (0.35, 1.1)
 """height over width of the plan, at least and at most"""
 BOX = 0.55
 """height of a box, of 1 from one estimate to the next"""
-CHECK_COLORS = {"ate": "#0072b2", "divergence": "#d55e00"}
-CHECK_LABELS = {"ate": "aligned", "divergence": "not aligned"}
+CHECK_ALIGNED = "#0072b2"
+CHECK_LINES = {"ate": (CHECK_ALIGNED, "aligned"), "divergence": ("#d55e00", "not aligned")}
 
 
 def figure_functions(comparison: "Comparison") -> dict[str, DrawOne]:
@@ -52,18 +46,6 @@ def figure_functions(comparison: "Comparison") -> dict[str, DrawOne]:
     return each | {f"three_sigma_{n}": partial(_three_sigma, data, r) for n, r in comparison.results.items()}
 
 
-def draw(comparison: "Comparison") -> dict[str, Figure]:
-    """Figures by name; those for which there is nothing to show are missing."""
-    return drawn(figure_functions(comparison))
-
-
-def drawn_in_background(
-    comparison: "Comparison", processes: int
-) -> AbstractContextManager[Callable[[], dict[str, EncodedFigure]]]:
-    """Begins to draw, in other processes; what it gives waits for what `draw` draws, by name, encoded."""
-    return encoded_in_background(figure_functions(comparison), processes)
-
-
 def draw_for_paper(data: ComparisonData) -> dict[str, tuple[Figure, str]]:
     """Figures of a comparison for a paper in two columns: name -> figure and caption."""
     words = {"reference": data.reference, "alignment": data.alignment, "pairs": data.pairs, "lengths": data.lengths}
@@ -72,19 +54,12 @@ def draw_for_paper(data: ComparisonData) -> dict[str, tuple[Figure, str]]:
 
 def paths(data: ComparisonData, style: Style = SCREEN) -> Figure:
     """All aligned paths over the reference's, from above."""
-    flat, line = {name: path[:, :2] for name, path in data.paths.items()}, data.line(style)
+    flat = {name: data.paths[name][:, :2] for name in (data.reference, *data.names)}
     box = common_window([flat[name] for name in data.names], flat[data.reference]).shaped(ASPECT, 1e-3)
     width, height = box.high - box.low
     figure = Figure(figsize=(style.width, (style.width - 0.6) * height / width + (1.4 if style.titled else 0.75)))
     axes = figure.subplots()
-    handles: list[Any] = []
-    for name in (data.reference, *data.names):
-        handles += axes.plot(*flat[name].T, **line(name))
-        if style.titled:
-            axes.plot(*flat[name][-1:].T, "s", color=data.colors[name], markersize=5, zorder=4)
-    start = flat[data.reference][:1]
-    handles += axes.plot(*start.T, "o", label="start of the reference", markersize=8 if style.titled else 4, **WHITE)
-    handles += [swatch(GRAY, "end")] if style.titled else []
+    handles = overlaid(axes, flat, data.line(style), style, start="start of the reference")
     frame_top_view(axes, box, *(f"{name} from the start, m" for name in data.axes[:2]))
     title_and_legend(figure, f"Trajectories from above, {data.alignment}", handles, style)
     return figure
@@ -133,7 +108,11 @@ def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     handles: list[Any] = []
     for row, (delta, motions) in zip(panels, data.relative.items(), strict=True):
         for panel, column, unit in zip(row, ("translation", "rotation_deg"), ("m", "°"), strict=True):
-            handles += _boxes(panel, names, data.colors, motions, column)
+            for name, table in motions.items():
+                handles += _box(panel, names.index(name), without_nan(table[column]), data.colors[name])
+            panel.set_yticks(range(len(names)), [safe_text(name) for name in names])
+            panel.set_ylim(len(names) - 0.5, -0.5)
+            panel.grid(axis="y", visible=False)
             panel.set(xlabel=f"over {delta}: {column.removesuffix('_deg')}, {unit}", xlim=(0.0, None))
     over = " and ".join(data.relative)
     legend = handles[:2] if style.titled else []
@@ -141,21 +120,11 @@ def relative(data: ComparisonData, style: Style = SCREEN) -> Figure | None:
     return figure
 
 
-def _boxes(
-    panel: Axes, names: list[str], color: Mapping[str, str], motions: Mapping[str, Columns], column: str
-) -> list[Any]:
-    """Draws a box for each of the names; gives the legend's handles of median and RMSE."""
-    handles: list[Any] = []
-    for name, table in motions.items():
-        handles += _box(panel, names.index(name), without_nan(table[column]), color[name])
-    panel.set_yticks(range(len(names)), [safe_text(name) for name in names])
-    panel.set_ylim(len(names) - 0.5, -0.5)
-    panel.grid(axis="y", visible=False)
-    return handles
-
-
 def _box(panel: Axes, y: float, values: FloatArray, color: str) -> list[Any]:
-    """Horizontal box at a height, as `Axes.boxplot` has it, which imports pyplot and makes more artists."""
+    """Draws a horizontal box at a height, as `Axes.boxplot` has it, which imports pyplot and makes more artists.
+
+    Gives the legend's handles of median and RMSE.
+    """
     (at,) = boxplot_stats(values, whis=(5, 95))
     low, q1, median, q3, high, apart = (*(at[key] for key in ("whislo", "q1", "med", "q3", "whishi")), np.nan)
     box = Rectangle((q1, y - BOX / 2), q3 - q1, BOX, zorder=2.0, facecolor=color, alpha=0.45, edgecolor=color)
@@ -199,11 +168,11 @@ EACH: Captioned = {
 
 def _reprojection(comparison: "Comparison", data: ComparisonData) -> Figure | None:
     """Share of the observations that each path explains to within so many pixels; None without observations."""
-    known = {name: p for name, p in comparison.pixels.items() if p.along is not None and len(p.along)}
-    if not known:
+    pixels = comparison.pixels
+    along = {name: p.along["error"] for name, p in pixels.items() if p.along is not None and len(p.along)}
+    own = {name: p.own["error"] for name, p in pixels.items() if name in along and p.own is not None and len(p.own)}
+    if not along:
         return None
-    along = {name: p.along["error"] for name, p in known.items() if p.along is not None}
-    own = {name: p.own["error"] for name, p in known.items() if p.own is not None and len(p.own)}
     labels = ["triangulated along the trajectory", *(["its own landmarks"] if own else [])]
     return distribution(along, own, data.line(), labels)
 
@@ -227,8 +196,8 @@ def draw_failed_check(
         above, below = figure.subplots(2, 1, height_ratios=(2, 1))
         _aligned_paths(above, aligned)
         for name, (table, largest) in errors.items():
-            t, color = table["t"] - table["t"].iloc[0], CHECK_COLORS[name]
-            below.plot(t, table["translation"], color=color, label=CHECK_LABELS[name])
+            color, label = CHECK_LINES[name]
+            below.plot(table["t"] - table["t"].iloc[0], table["translation"], color=color, label=label)
             if largest is not None:
                 below.axhline(largest, color=color, linestyle=(0, (4, 2)), linewidth=1.0)
         moment = "time since the first pose, s" if aligned.reference.stamped else "frame"
@@ -240,17 +209,13 @@ def draw_failed_check(
 
 
 def _aligned_paths(axes: Axes, aligned: MatchedTrajectories) -> None:
-    plane = widest_plane(aligned.reference.position)
-    here = aligned.reference.position @ plane
+    reference = aligned.reference.position
+    _, _, Vt = np.linalg.svd(reference - reference.mean(axis=0), full_matrices=True)
+    plane = Vt[:2].T  # in which the reference spreads most
+    here = reference @ plane
     axes.plot(*here.T, color=TRUTH, linestyle=(0, (4, 2)), linewidth=1.8, label=safe_text(aligned.reference.name))
-    axes.plot(*(aligned.estimate.position @ plane).T, color=CHECK_COLORS["ate"], label=safe_text(aligned.estimate.name))
+    axes.plot(*(aligned.estimate.position @ plane).T, color=CHECK_ALIGNED, label=safe_text(aligned.estimate.name))
     axes.plot(*here[0], color=TRUTH, marker="o", linestyle="none", label="start")
     title = f"in the plane in which {safe_text(aligned.reference.name)} is widest, aligned"
     axes.set(aspect="equal", adjustable="datalim", xlabel="m", ylabel="m", title=title)
     axes.legend()
-
-
-def widest_plane(positions: FloatArray) -> FloatArray:
-    """Orthonormal directions (3, 2) in which positions (n, 3) spread most."""
-    _, _, Vt = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=True)
-    return np.asarray(Vt[:2].T)

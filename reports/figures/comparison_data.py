@@ -17,8 +17,7 @@ from fgbaseline.geometry import FloatArray, InputError
 
 from ..results.json_files import COMPARISON
 from ..results.reader import RunFolder
-from .palette import colors
-from .style import SCREEN, Line, Style, lines
+from .style import SCREEN, Line, Style, colors, lines
 
 if TYPE_CHECKING:
     import pandas as pd

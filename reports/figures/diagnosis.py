@@ -15,9 +15,9 @@ from fgbaseline.diagnosis.repairs.significance import significant_bias
 from fgbaseline.geometry import FloatArray
 
 from .drawing import DrawOne, drawn
-from .legend import swatch, title_and_legend
-from .palette import GRAY
-from .style import SCREEN, stacked_panels
+from .layout import title_and_legend
+from .panels import swatch
+from .style import GRAY, SCREEN, stacked_panels
 
 SEEN, RECORDED, REPAIRED = "#111111", "#D55E00", "#0072B2"
 """the cameras, the recording and what the repair makes of it"""
@@ -39,32 +39,28 @@ def draw_diagnosis(diagnosis: Diagnosis, tracks: TrackStatistics) -> dict[str, F
 def angular_rates(diagnosis: Diagnosis) -> Figure:
     """Angular rates that the cameras see, as recorded and as repaired, about each axis of imu_T_cam."""
     assert diagnosis.odometry is not None
-    sequence, odometry = diagnosis.sequence, diagnosis.odometry
-    bias = significant_bias(diagnosis)
+    sequence, known, bias = diagnosis.sequence, diagnosis.odometry.known, significant_bias(diagnosis)
     recorded = zero_order_hold(sequence, Shift.AFTER)[:, 3:]
     repaired = zero_order_hold(sequence, diagnosis.shift)
     repaired[:, 3:] -= bias
     repaired = twist_in_imu_axes(repaired, IDENTITY, diagnosis.angular.name)[:, 3:]
-    seen = odometry.twist(sequence.dt)[:, 3:]
+    seen = np.where(known[:, None], diagnosis.odometry.twist(sequence.dt)[:, 3:], np.nan)
     t = sequence.t[:-1] - sequence.t[0]
     width = AVERAGED_OVER / float(np.median(sequence.dt))
     figure, axes = stacked_panels(6.4, 3)
+    shown = {"visual odometry": (seen, SEEN, 2.2), "as recorded": (recorded, RECORDED, 1.1)}
     changed = diagnosis.angular.changed or bool(bias.any()) or diagnosis.shift != 0.0
+    if changed:
+        shown["repaired"] = (repaired, REPAIRED, 1.1)
     handles: list[Any] = []
     for i, axis in enumerate(axes):
-        known = odometry.known
-        values = moving_mean(np.where(known, seen[:, i], np.nan), width)
-        lines = axis.plot(t, values, color=SEEN, linewidth=2.2, label="visual odometry", zorder=2)
-        lines += axis.plot(t, moving_mean(recorded[:, i], width), color=RECORDED, linewidth=1.1, label="as recorded")
-        if changed:
-            lines += axis.plot(t, moving_mean(repaired[:, i], width), color=REPAIRED, linewidth=1.1, label="repaired")
+        for label, (rates, color, thick) in shown.items():
+            handles += axis.plot(t, moving_mean(rates[:, i], width), color=color, linewidth=thick, label=label)
         axis.set_ylabel(f"w_{'xyz'[i]}, rad/s")
         before, after = (float(np.median(np.abs(seen[known, i] - r[known, i]))) for r in (recorded, repaired))
-        text = f"median difference of single intervals {before:.3f} rad/s" + (
-            f", repaired {after:.3f}" if changed else ""
-        )
+        text = f"median difference of single intervals {before:.3f} rad/s"
+        text += f", repaired {after:.3f}" if changed else ""
         axis.set_title(text, loc="right", fontsize=8, color=GRAY, pad=2.0)
-        handles = handles or lines
     axes[-1].set(xlabel="time, s", xlim=(0.0, float(t[-1])))
     title = f"Angular velocity about the IMU axes, averaged over {AVERAGED_OVER:g} s"
     title_and_legend(figure, title, handles)

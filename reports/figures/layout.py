@@ -1,14 +1,18 @@
-"""Layout of a figure: computed once, then fixed for every format it is written in.
+"""Layout of a figure: title and legend, then positions, computed once and fixed for every format it is written in.
 
 Panels are placed by matplotlib's constrained layout in closed form, for figures that are one grid of panels below one
 legend. That engine measures every tick label and solves repeatedly, which takes most of its time. Here it is done once
 at approximate sizes, and again only where that changed the ticks.
-Logarithmic axes are labeled with numbers: 0.01, 3, 200, and powers only where these would be long.
+Logarithmic axes are labeled with numbers: 0.01, 3, 200, and powers only where these would be long. Lines that coincide
+become ribbons, so that all of them show.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from itertools import pairwise
+from textwrap import fill
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -25,6 +29,18 @@ from numpy.typing import ArrayLike
 
 from fgbaseline.geometry import FloatArray
 
+from .style import REFERENCE_ORDER, SCREEN, Style
+
+TITLE_LETTERS = 82
+"""characters in a line of a title, which is bold and larger than the legend"""
+SAMPLES = 200
+"""points of a line that are compared"""
+SAME = 1.5
+"""px of a PNG: lines nearer than this everywhere coincide"""
+STRIPE = 1.4
+"""pt, difference in width between a line and the one drawn on it"""
+BELOW_REFERENCE = 1.9
+"""zorder of what coincides with the reference"""
 PAD = 0.042
 """inches around each panel with its labels, and around the legend"""
 DEFAULT_MARGINS = (0.6, 0.12, 0.25)
@@ -37,6 +53,81 @@ LEFT, RIGHT, BOTTOM, TOP = range(4)
 LONG = (1e-4, 1e5)
 """an axis that reaches beyond these is labeled with powers of ten"""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def title_and_legend(figure: Figure, title: str, handles: Iterable[Any] = (), style: Style = SCREEN) -> None:
+    """Title on top of a figure (not on paper), in lines, and below it one legend: each label once, in rows.
+
+    Called when the panels are drawn. The title of a panel names the lines that are not seen, as all their values are
+    below its logarithmic ordinate. On the screen the lower ones of lines that coincide become wider.
+    """
+    by_label = {str(handle.get_label()): handle for handle in handles}
+    figure.set_label(title)
+    if not style.titled and not by_label:
+        return
+    font = {"weight": "bold", "size": 11.5}
+    bold: dict[str, Any] = {"title": fill(title, TITLE_LETTERS), "title_fontproperties": font}
+    look = {"borderpad": 0.2, "alignment": "left", **bold} if style.titled else {}
+    columns = _legend_columns([len(text) + style.spare for text in by_label], style.letters)
+    legend = figure.legend(list(by_label.values()), list(by_label), loc="outside upper left", ncols=columns, **look)
+    legend.get_title().set_color("#222222")
+    for axes in figure.axes:
+        _name_lines_below(axes)
+    for axes in figure.axes if style.titled else []:
+        _widen_coinciding(axes)
+
+
+def _name_lines_below(axes: Axes) -> None:
+    if axes.get_yscale() != "log":
+        return
+    below = []
+    for line in axes.get_lines():
+        y = np.asarray(line.get_ydata(), dtype=np.float64)
+        known = y[np.isfinite(y)]
+        if not str(line.get_label()).startswith("_") and len(known) and known.max() < axes.get_ylim()[0]:
+            below.append(str(line.get_label()))
+    if below:
+        title = filter(None, [axes.get_title(loc="left"), f"below the axis: {' and '.join(below)}"])
+        axes.set_title(", ".join(title), loc="left")
+
+
+def _legend_columns(widths: Sequence[int], room: int) -> int:
+    """Most columns that fit into the room; entries of these widths fill a legend column by column."""
+    for columns in range(len(widths), 1, -1):
+        each, longer = divmod(len(widths), columns)
+        ends = np.cumsum([0] + [each + (i < longer) for i in range(columns)])
+        if sum(max(widths[i:j]) for i, j in pairwise(ends.tolist())) <= room:
+            return columns
+    return 1
+
+
+def _widen_coinciding(axes: Axes) -> None:
+    """Shows coinciding lines as a ribbon: each is wider than the lines drawn on it.
+
+    The reference, the line of REFERENCE_ORDER, lies on the lines that coincide with it, and below all others.
+    """
+    named = [line for line in axes.get_lines() if not str(line.get_label()).startswith("_")]
+    points = {line: np.asarray(line.get_xydata()) for line in named}
+    places = {line: axes.transData.transform(at) for line, at in points.items() if len(at) > 2}
+    lines = list(places)
+    for reference in [line for line in lines if line.get_zorder() == REFERENCE_ORDER]:
+        for line in lines:
+            if line is not reference and _coincide(places[line], places[reference]):
+                line.set_zorder(BELOW_REFERENCE)
+    drawn = sorted(lines, key=Line2D.get_zorder)
+    for i in reversed(range(len(drawn))):
+        above = [on.get_linewidth() for on in drawn[i + 1 :] if _coincide(places[drawn[i]], places[on])]
+        drawn[i].set_linewidth(max([drawn[i].get_linewidth(), *(STRIPE + width for width in above)]))
+
+
+def _coincide(a: FloatArray, b: FloatArray) -> bool:
+    """Whether points (n, 2) of two lines, px, are the same; a line without a finite point coincides with none."""
+    if len(a) != len(b):
+        return False
+    some = slice(None, None, max(1, len(a) // SAMPLES))
+    known = np.isfinite(a[some]).all(axis=1)
+    same_gaps = np.array_equal(known, np.isfinite(b[some]).all(axis=1))
+    return bool(same_gaps and known.any() and np.abs(a[some][known] - b[some][known]).max() <= SAME)
 
 
 def lay_out(figure: Figure) -> None:
@@ -101,7 +192,9 @@ def fill_grid(figure: Figure) -> dict[Axes, Bbox]:
     FigureCanvasAgg(figure)  # measures without drawing
     size = figure.get_size_inches()
     head = max((legend.get_window_extent().height / figure.dpi + 2.0 * PAD for legend in figure.legends), default=0.0)
-    _place(panels, np.array([_default_margins(spec) for _, spec in panels]), size, head)
+    left, right, above = DEFAULT_MARGINS
+    margins = [(left, right, BELOW if spec.is_last_row() else BELOW_INNER, above) for _, spec in panels]
+    _place(panels, np.array(margins), size, head)
     for _ in range(PASSES):
         ticks, own = _ticks(panels), {axes: axes.get_window_extent().frozen() for axes, _ in panels}
         _place(panels, np.array([_outer_margins(axes) for axes, _ in panels]) / figure.dpi, size, head)
@@ -113,11 +206,6 @@ def fill_grid(figure: Figure) -> dict[Axes, Bbox]:
 def _ticks(panels: list[tuple[Axes, SubplotSpec]]) -> list[list[float]]:
     """Positions of the major ticks of each axis; they change with the size of a panel, and the labels with them."""
     return [axis.get_majorticklocs().tolist() for axes, _ in panels for axis in (axes.xaxis, axes.yaxis)]
-
-
-def _default_margins(spec: SubplotSpec) -> tuple[float, float, float, float]:
-    left, right, above = DEFAULT_MARGINS
-    return left, right, BELOW if spec.is_last_row() else BELOW_INNER, above
 
 
 def _outer_margins(axes: Axes) -> tuple[float, float, float, float]:
@@ -158,9 +246,8 @@ class Numbers(LogFormatter):
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         """The label of the tick at x; empty where it has none."""
-        return self._number(x) if super().__call__(x, pos) else ""
-
-    def _number(self, x: float) -> str:
+        if not super().__call__(x, pos):
+            return ""
         low, high = sorted(self.axis.get_view_interval())  # type: ignore[union-attr]
         if LONG[0] <= low and high <= LONG[1]:
             return f"{x:g}"
@@ -190,13 +277,13 @@ def draw_minor_ticks_at_once(panels: Iterable[Axes]) -> None:
         if len(at) == 0:
             continue
         axis.set_minor_locator(NullLocator())
-        zero, rc = np.zeros(len(at)), mpl.rcParams
+        zero, name = np.zeros(len(at)), f"{axis.axis_name}tick"
+        rc: Any = mpl.rcParams
         if axis.axis_name == "x":
             ticks = Line2D(at, zero, transform=axes.get_xaxis_transform(), marker=MarkerStyle(TICKDOWN))
-            size, width, color = rc["xtick.minor.size"], rc["xtick.minor.width"], rc["xtick.color"]
         else:
             ticks = Line2D(zero, at, transform=axes.get_yaxis_transform(), marker=MarkerStyle(TICKLEFT))
-            size, width, color = rc["ytick.minor.size"], rc["ytick.minor.width"], rc["ytick.color"]
+        size, width, color = (rc[f"{name}.{key}"] for key in ("minor.size", "minor.width", "color"))
         ticks.set(markersize=size, markeredgewidth=width, color=color, linestyle="none", clip_on=False)
         ticks.set_in_layout(False)
         axes.add_artist(ticks)

@@ -1,8 +1,8 @@
-"""Figures over time: divergence from the reference, error to ground truth, height, and time per frame."""
+"""Figures over time: divergence, errors and their 3-sigma bounds, consistency (NEES, NIS), and time per frame."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,40 +11,39 @@ from matplotlib.figure import Figure
 from fgbaseline.compare.column_tables import Columns
 from fgbaseline.geometry import FloatArray
 
-from .axis_limits import common_window, signed_range
-from .legend import title_and_legend
-from .palette import GRAY
+from ..formatting import per_cent
+from .layout import title_and_legend
 from .panels import (
-    CONSISTENT,
+    COMPONENTS,
+    DEGREES_OF_FREEDOM,
+    SIGNED,
+    TAIL,
     chi_square_band,
+    columns,
+    component_panels,
     few_ticks,
     fit_log,
     fit_log_or_linear,
-    fit_signed,
     note_out_of_range,
     plot_series,
     running_median,
     smoothed,
+    time_axis,
+    widen_ordinate,
 )
 from .run_data import RunData
-from .style import SCREEN, Line, Style, safe_text, stacked_panels
+from .style import GRAY, SCREEN, Style, safe_text, stacked_panels
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-COMPONENTS = {
-    "position": "position, m",
-    "rotation_deg": "rotation, °",
-    "along": "ahead, m",
-    "across": "to the left, m",
-    "up": "above, m",
-}
-"""columns of `compare.pose_errors`, as the panels have them"""
-SIGNED = ("along", "across", "up")
-MIN_HEIGHT_RANGE = 0.1
-"""height over extent, up to which any path is shown"""
 TITLE_ROOM = 58
 """letters that a title has for numbers"""
+AXES = ("x, m", "y, m", "z, m", "rotation x, °", "rotation y, °", "rotation z, °")
+QUANTITIES = {
+    "velocity": ("velocity", "m/s"),
+    "gyroscope_bias": ("gyro bias", "rad/s"),
+    "accelerometer_bias": ("acc. bias", "m/s^2"),
+}
+"""columns of `compare.velocity_and_bias_errors`, and how little room there is for their headings"""
+OVER_BAND, BELOW_ONE = "above the band: covariance too small", "below 1: overconfident"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +62,7 @@ class Panel:
     degrees: float | None = None
     """degrees of freedom of the chi-square of a consistent estimator, over `per`, whose band is drawn"""
     per: float = 1.0
-    band: str = CONSISTENT
+    band: str = "95 % if consistent (dotted: median)"
     """the band's entry in the legend"""
     expected: float | None = None
     """value of a consistent estimator"""
@@ -96,24 +95,16 @@ def time_panels(run: RunData, wanted: Sequence[Panel], title: str, style: Style,
             width = 0.9 if style.titled else 0.6
             bands.append(chi_square_band(on, panel.degrees, panel.band, per=panel.per, width=width))
         if panel.expected is not None:
-            bottom, top = on.get_ylim()
-            on.set_ylim(min(bottom, 0.7 * panel.expected), max(top, 1.4 * panel.expected))
+            widen_ordinate(on, 0.7 * panel.expected, 1.4 * panel.expected)
             on.axhline(panel.expected, color=GRAY, linestyle=":", linewidth=0.9, zorder=2.5)
         few_ticks(on, style)
         on.set_ylabel(panel.label)
         remarks = [panel.title, smoothed(len(run.t)) if panel.smooth and style.titled else ""]
         on.set_title(", ".join(filter(None, remarks)))
-    time_axis(run, axes, style)
+    time_axis(axes, run.t, style)
     order = [run.line(style)(name)["label"] for name in run.names]  # a panel may lack the first of them
     title_and_legend(figure, title, [*sorted(lines, key=lambda one: order.index(one.get_label())), *bands], style)
     return figure
-
-
-def time_axis(run: RunData, axes: Sequence[Axes], style: Style = SCREEN) -> None:
-    """Labels the lowest panel and, on the screen, fits all to the recording."""
-    if style.titled:
-        axes[-1].set_xlim(0.0, float(run.t[-1]))
-    axes[-1].set_xlabel("time, s")
 
 
 def divergence(run: RunData, style: Style = SCREEN) -> Figure | None:
@@ -138,101 +129,18 @@ def error_to_truth(run: RunData, style: Style = SCREEN) -> Figure | None:
     return _errors(run, "truth", names, "Unaligned error to ground truth", names) if names else None
 
 
-def component_panels(
-    tables: Mapping[str, Columns], t: Mapping[str, FloatArray], line: Line, style: Style = SCREEN
-) -> tuple[Figure, list[Axes], list[Any]]:
-    """Distance, angle and components of errors (see `compare.pose_errors`) over t, by name, and the lines' handles.
-
-    On paper distance and angle alone.
-    """
-    every = {c: columns(tables, c) for c in COMPONENTS if style.titled or c not in SIGNED}
-    shown = {c: series for c, series in every.items() if any(np.isfinite(v).any() for v in series.values())} or every
-    ratios = [1.7 if style.titled else 1.0, *[1.0] * (len(shown) - 1)]
-    height = 8.6 * sum(ratios) / 5.7 if style.titled else style.room + 0.95 * sum(ratios)
-    figure, axes = stacked_panels(height, len(shown), style, height_ratios=ratios)
-    handles: list[Any] = []
-    for panel, (column, series) in zip(axes, shown.items(), strict=True):
-        for name, values in series.items():
-            handles += panel.plot(t[name], values, **line(name))
-        panel.set_ylabel(COMPONENTS[column])
-        if column in SIGNED:
-            panel.axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
-        else:
-            fit_log_or_linear(panel, series)
-            few_ticks(panel, style)
-    return figure, axes, handles
-
-
-def columns(tables: Mapping[str, Columns], column: str) -> dict[str, FloatArray]:
-    """Values (n,) of a column of each table."""
-    return {name: np.asarray(table[column]) for name, table in tables.items()}
-
-
-def height(run: RunData) -> Figure:
-    """Height above the start over time."""
-    heights = {name: path[:, 2] for name, path in run.paths.items()}
-    true = None if run.truth is None else run.truth[:, 2]
-    figure, axes = stacked_panels(3.4)
-    handles = axes[0].plot(run.t, true, **SCREEN.truth) if true is not None else []
-    handles += plot_series(axes[0], run.t, heights, run.line())
-    least = MIN_HEIGHT_RANGE * common_window(run.paths.values(), run.truth).side
-    box = common_window([h[:, None] for h in heights.values()], None if true is None else true[:, None], least)
-    box = box.grown(0.06 * box.side + 0.05)
-    axes[0].set_ylim(float(box.low[0]), float(box.high[0]))
-    axes[0].set_ylabel("height, m")
-    note_out_of_range(axes[0], run.t, heights, float(box.low[0]), float(box.high[0]))
-    time_axis(run, axes)
-    title_and_legend(figure, "Height above the start", handles)
-    return figure
-
-
-def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
-    """Time per frame, on the screen beside the interval between frames; None where none is known."""
-    if not style.titled:
-        return time_panels(run, [Panel("time per frame, s", "seconds", 1.2, decades=5.0, smooth=True)], "", style)
-    times = {name: running_median(ms) for name, ms in run.milliseconds().items()}
-    if not times:
-        return None
-    figure, axes = stacked_panels(3.4)
-    handles: list[Any] = []
-    equal: dict[bytes, list[str]] = {}  # estimators that one run gave
-    for name, ms in times.items():
-        equal.setdefault(ms.tobytes(), []).append(name)
-    for name, *others in equal.values():
-        together = " and ".join(map(safe_text, (name, *others)))
-        handles += plot_series(axes[0], run.t, {name: times[name]}, run.line(), linewidth=0.9, label=together)
-    interval = 1e3 * float(np.median(np.diff(run.t)))
-    fit_log(axes[0], times)
-    low, high = axes[0].get_ylim()
-    axes[0].set_ylim(min(low, interval / 1.5), max(high, 1.5 * interval))
-    look: dict[str, Any] = {"color": "#888888", "linewidth": 1.0, "linestyle": ":"}
-    real_time = axes[0].axhline(interval, **look, label=f"interval between frames ({interval:.3g} ms)")
-    axes[0].set_ylabel("time, ms")
-    axes[0].set_title(smoothed(len(run.t)))
-    time_axis(run, axes)
-    title_and_legend(figure, "Time per frame", [*handles, real_time])
-    return figure
-
-
 def _errors(run: RunData, prefix: str, names: Sequence[str], title: str, rivals: Sequence[str]) -> Figure:
     """Panels of the components, with notes of what leaves them; the title has the maxima of the rivals."""
-    tables = {n: _with_prefix(run.series[n], f"{prefix}_") for n in names}
-    t = dict.fromkeys(names, run.t)
-    figure, axes, handles = component_panels(tables, t, run.line())
+    tables = {name: run.errors(name, prefix) for name in names}
+    figure, axes, handles = component_panels(tables, dict.fromkeys(names, run.t), run.line())
     traveled = max((float(np.nanmax(v)) for v in columns(tables, "traveled").values()), default=0.0)
-    signed = [np.concatenate([table[column] for column in SIGNED]) for table in tables.values()]
-    reach = signed_range(signed, 0.05 * traveled)
+    reach = _signed_reach([np.concatenate([t[column] for column in SIGNED]) for t in tables.values()], 0.05 * traveled)
     for panel, column in zip(axes, COMPONENTS, strict=True):
         if column in SIGNED:
-            fit_signed(panel, run.t, columns(tables, column), reach)
-    time_axis(run, axes)
+            _fit_signed(panel, run.t, columns(tables, column), reach)
+    time_axis(axes, run.t)
     title_and_legend(figure, title + _maxima({name: tables[name] for name in rivals}), handles)
     return figure
-
-
-def _with_prefix(table: "pd.DataFrame", prefix: str) -> Columns:
-    chosen = [column for column in table.columns if column.startswith(prefix)]
-    return {column.removeprefix(prefix): table[column].to_numpy(dtype=np.float64) for column in chosen}
 
 
 def _maxima(tables: Mapping[str, Columns]) -> str:
@@ -243,3 +151,149 @@ def _maxima(tables: Mapping[str, Columns]) -> str:
     each = [f"{safe_text(name)} up to {far:.3g} m" for name, far in sorted(farthest.items(), key=lambda item: item[1])]
     name, far = max(farthest.items(), key=lambda item: item[1])
     return ": " + (", ".join(each) if sum(map(len, each)) < TITLE_ROOM else f"at most {far:.3g} m ({safe_text(name)})")
+
+
+def _signed_reach(series: Sequence[FloatArray], least: float) -> float:
+    """Reach of an axis on either side of zero for several series (n,) of signed values.
+
+    To the largest value, unless one series reaches more than 30 times as far as any other and farther than `least`.
+    """
+    sizes = [size for values in series if len(size := np.abs(values[np.isfinite(values)]))]
+    if not sizes:
+        return 1.0
+    reach = sorted((float(np.percentile(size, 100.0 - TAIL)) for size in sizes), reverse=True)
+    second = reach[1] if len(reach) > 1 else 0.0
+    trusted = 3.0 * reach[0] if reach[0] <= 30.0 * second else 3.0 * second
+    return max(min(max(float(size.max()) for size in sizes), max(trusted, least)), 1e-12)
+
+
+def _fit_signed(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray], reach: float) -> None:
+    """Linear ordinate out to `reach` on either side, with a note of which series (T,) leave it and when."""
+    values = np.concatenate([v[np.isfinite(v)] for v in series.values()] or [np.empty(0)])
+    low, high = (float(values.min()), float(values.max())) if len(values) else (-reach, reach)
+    low, high = max(low, -reach), min(high, reach)
+    margin = max(0.06 * (high - low), 1e-9)
+    axes.set_ylim(low - margin, high + margin)
+    note_out_of_range(axes, t, series, -reach, reach)
+
+
+def nees(run: RunData) -> Figure | None:
+    """NEES of each pose against ground truth; None without truth or covariances."""
+    label, bounds = "NEES (above: overconfident)", "95 % bounds (6 dof)"
+    panel = Panel(label, "nees", 3.8 - SCREEN.room, 6.0, degrees=DEGREES_OF_FREEDOM, band=bounds)
+    return time_panels(run, [panel], "NEES of each pose: squared error over covariance", SCREEN, linewidth=1.1)
+
+
+def consistency(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Reference NEES, NIS and sigma ratios over time; None without any of these. On paper also the NEES."""
+    rows = run.nis_rows
+    pose: dict[str, Any] = {"degrees": DEGREES_OF_FREEDOM}
+    nis: dict[str, Any] = {"smooth": True, "degrees": rows, "per": rows or 1.0}
+    if not style.titled:
+        panels = [
+            Panel("NEES", "nees", 0.95, 5.0, **pose),
+            Panel("ref. NEES", "nees_reference", 0.95, 5.0, **pose),
+            Panel("NIS per degree of freedom", "nis_per_row", 0.95, 5.0, **nis),
+            Panel("sigma ratio", "sigma_ratio_position", 0.95, 5.0),
+        ]
+        return time_panels(run, panels, "", style)
+    panels = [
+        Panel("reference NEES", "nees_reference", 1.95, 5.0, OVER_BAND, **pose),
+        Panel("NIS per degree of freedom", "nis_per_row", 1.95, 5.0, OVER_BAND, **nis),
+        Panel("sigma ratio,\nposition", "sigma_ratio_position", 1.95, 5.0, BELOW_ONE, expected=1.0),
+        Panel("sigma ratio,\nrotation", "sigma_ratio_rotation", 1.95, 5.0, BELOW_ONE, expected=1.0),
+    ]
+    title = f"Consistency, compared with {safe_text(run.reference)}" if run.reference else "Consistency"
+    return time_panels(run, panels, title, style, linewidth=1.0)
+
+
+def three_sigma(
+    name: str, t: FloatArray, error: FloatArray | None, covariance: FloatArray | None, look: Mapping[str, Any]
+) -> Figure | None:
+    """Errors (n, 6) in the body frame at t (n,), s, with ±3-sigma bounds of their covariances (n, 6, 6).
+
+    None without truth or covariances.
+    """
+    if error is None or covariance is None or not np.isfinite(error).any() or not np.isfinite(covariance).any():
+        return None
+    scale = np.repeat([1.0, np.rad2deg(1.0)], 3)
+    with np.errstate(invalid="ignore"):
+        sigma = scale * np.sqrt(np.einsum("tii->ti", covariance))
+    title = f"{safe_text(name)}: error in the body frame, with ±3-sigma bounds (99.7 %)"
+    shown = dict(zip(AXES, zip((scale * error).T, sigma.T, strict=True), strict=True))
+    return _between_three_sigmas(title, t, shown, look)
+
+
+def velocity_and_biases(run: RunData, name: str) -> Figure | None:
+    """Unaligned errors of velocity and biases with ±3-sigma bounds; None without covariance or truth of any."""
+    series = run.series[name]
+    shown = {
+        f"{heading} {axis}, {unit}": tuple(
+            series[column].to_numpy(dtype=np.float64) for column in (f"truth_{q}_{axis}", f"{q}_sigma_{axis}")
+        )
+        for q, (heading, unit) in QUANTITIES.items()
+        for axis in "xyz"
+        if f"truth_{q}" in series and series[f"truth_{q}"].notna().any() and series[f"{q}_sigma_x"].notna().any()
+    }
+    if not shown:
+        return None
+    title = f"{safe_text(name)}: unaligned errors of velocity and biases, % within the ±3-sigma bounds (99.7)"
+    return _between_three_sigmas(title, run.t, shown, run.line()(name))
+
+
+def _between_three_sigmas(
+    title: str, t: FloatArray, shown: Mapping[str, tuple[FloatArray, ...]], look: Mapping[str, Any]
+) -> Figure:
+    """Columns of three panels, each with an error (n,) and its sigma (n,) by heading."""
+    figure = Figure(figsize=(SCREEN.width, 5.4))
+    panels = figure.subplots(3, len(shown) // 3, sharex=True, squeeze=False)
+    within = " inside" if len(shown) <= 6 else ""  # three columns have no room for it
+    handles: list[Any] = []
+    for panel, (axis, (e, s)) in zip(panels.T.ravel(), shown.items(), strict=True):
+        band = panel.fill_between(t, -3.0 * s, 3.0 * s, color="#d9e2ec", linewidth=0, label="±3-sigma bounds")
+        drawn = panel.plot(t, e, **{**look, "linewidth": 1.0, "label": "error"})
+        panel.set_ylim(-(reach := _reach(e, s)), reach)
+        both = np.isfinite(e) & np.isfinite(s) & (s > 0)
+        inside = float(np.mean(np.abs(e[both]) <= 3.0 * s[both])) if both.any() else float("nan")
+        panel.set_title(f"{axis}: {per_cent(inside)}{within}")
+        handles = handles or [*drawn, band]
+    for panel in panels[-1]:
+        panel.set_xlim(float(t[0]), float(t[-1]))
+        panel.set_xlabel("time, s")
+    title_and_legend(figure, title, handles)
+    return figure
+
+
+def _reach(error: FloatArray, sigma: FloatArray) -> float:
+    """Limit of a panel: over nearly all of the error, and the band as far as that leaves it visible."""
+    e = np.abs(error[np.isfinite(error)])
+    s = 3.0 * sigma[np.isfinite(sigma)]
+    most = float(np.percentile(e, 99)) if len(e) else 0.0
+    band = float(np.percentile(s, 98)) if len(s) else 0.0
+    return 1.15 * max(most, min(band, 30.0 * most), 1e-9)
+
+
+def time_per_frame(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Time per frame, on the screen beside the interval between frames; None where none is known."""
+    if not style.titled:
+        return time_panels(run, [Panel("time per frame, s", "seconds", 1.2, decades=5.0, smooth=True)], "", style)
+    times = {name: running_median(ms) for name, ms in run.milliseconds().items()}
+    if not times:
+        return None
+    figure, (axes,) = stacked_panels(3.4)
+    handles: list[Any] = []
+    equal: dict[bytes, list[str]] = {}  # estimators that one run gave
+    for name, ms in times.items():
+        equal.setdefault(ms.tobytes(), []).append(name)
+    for name, *others in equal.values():
+        together = " and ".join(map(safe_text, (name, *others)))
+        handles += plot_series(axes, run.t, {name: times[name]}, run.line(), linewidth=0.9, label=together)
+    interval = 1e3 * float(np.median(np.diff(run.t)))
+    fit_log(axes, times)
+    widen_ordinate(axes, interval / 1.5, 1.5 * interval)
+    look: dict[str, Any] = {"color": "#888888", "linewidth": 1.0, "linestyle": ":"}
+    real_time = axes.axhline(interval, **look, label=f"interval between frames ({interval:.3g} ms)")
+    axes.set(ylabel="time, ms", title=smoothed(len(run.t)))
+    time_axis([axes], run.t)
+    title_and_legend(figure, "Time per frame", [*handles, real_time])
+    return figure

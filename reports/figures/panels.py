@@ -1,28 +1,118 @@
-"""Building blocks of panels: series over time with their axes, chi-square bands, intervals, medians by depth."""
+"""Building blocks of panels: their limits, series over time and errors with their axes, chi-square bands, remarks.
 
-from collections.abc import Iterable, Mapping
+Limits are robust against a diverged estimate.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
 from fgbaseline import compare
+from fgbaseline.compare.column_tables import Columns
+from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray
 
-from .legend import note
-from .palette import BAND, GRAY
-from .style import Line, Style, safe_text
+from .style import BAND, GRAY, SCREEN, Line, Style, safe_text, stacked_panels
 
+TAIL = 2.0
+"""per cent of the points on either side that do not decide how far a cloud reaches"""
 DECADES = 1.5
 """spread of the estimators' maxima, in decades, above which an axis is logarithmic"""
 DEGREES_OF_FREEDOM = 6.0
 """degrees of freedom of a pose"""
-CONSISTENT = "95 % if consistent (dotted: median)"
 MEDIANS = 100
 """windows of a running median that a line holds"""
+COMPONENTS = {
+    "position": "position, m",
+    "rotation_deg": "rotation, °",
+    "along": "ahead, m",
+    "across": "to the left, m",
+    "up": "above, m",
+}
+"""columns of `compare.pose_errors`, as the panels have them"""
+SIGNED = ("along", "across", "up")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Window:
+    """Axis-parallel box: of a plane, or of one axis."""
+
+    low: FloatArray
+    high: FloatArray
+
+    @property
+    def side(self) -> float:
+        """Longer side."""
+        return float(np.max(self.high - self.low))
+
+    def grown(self, by: float) -> "Window":
+        """Window with a margin of `by` all around."""
+        return Window(self.low - by, self.high + by)
+
+    def with_points(self, points: FloatArray, around: float) -> "Window":
+        """Window grown to the bulk of those points (n, d) that lie within `around` of it."""
+        near = robust_window(points[self.grown(around).holds(points)])
+        return self if near is None else Window(np.minimum(self.low, near.low), np.maximum(self.high, near.high))
+
+    def shaped(self, slimmest: tuple[float, float], least: float, share: float = 0.04) -> "Window":
+        """Window (of a plane) with a margin, at least `least`, and a height over width within `slimmest`."""
+        box = self.grown(max(share * self.side, least))
+        width, height = box.high - box.low
+        missing = np.array([height / slimmest[1] - width, width * slimmest[0] - height]).clip(min=0.0)
+        return Window(box.low - 0.5 * missing, box.high + 0.5 * missing)
+
+    def holds(self, points: FloatArray) -> BoolArray:
+        """Mask (n,) of the points (n, d) inside."""
+        return np.asarray(((points >= self.low) & (points <= self.high)).all(axis=1), dtype=np.bool_)
+
+    def around(self, points: FloatArray) -> "Window":
+        """Box of the points (n, d) inside; the window itself without any."""
+        inside = points[self.holds(points)]
+        return Window(inside.min(axis=0), inside.max(axis=0)) if len(inside) else self
+
+
+def known(points: FloatArray) -> FloatArray:
+    """Finite ones (m, d) of the points (n, d)."""
+    return np.asarray(points[np.isfinite(points).all(axis=1)])
+
+
+def robust_window(points: FloatArray) -> Window | None:
+    """Box of points (n, d), at most half its size beyond the bulk of them; None without a point."""
+    finite = known(points)
+    if len(finite) == 0:
+        return None
+    bulk = Window(*np.percentile(finite, [TAIL, 100.0 - TAIL], axis=0))
+    return bulk.grown(0.5 * bulk.side + 1e-9).around(finite)
+
+
+def common_window(paths: Iterable[FloatArray], core: FloatArray | None, least: float = 1.0) -> Window:
+    """Box around paths (n, d), of which none may reach farther than its side beyond the box of the core.
+
+    The core is the path to be believed; without one, that of median size. Reaching `least` beyond it is always allowed.
+    """
+    every = list(paths)
+    windows = sorted((w for w in map(robust_window, every) if w is not None), key=lambda w: w.side)
+    believed = None if core is None else robust_window(core)
+    if believed is None:
+        believed = windows[(len(windows) - 1) // 2] if windows else Window(-np.ones(1), np.ones(1))
+    points = [known(path) for path in [*every, *([] if core is None else [core])]]
+    if not any(map(len, points)):
+        return believed
+    return believed.grown(max(believed.side, least)).around(np.concatenate(points))
+
+
+def frame_top_view(axes: Axes, box: Window, x: str = "", y: str = "") -> None:
+    """Frames a panel: equal scales, the box and the labels of its axes."""
+    (left, bottom), (right, top) = box.low, box.high
+    axes.set(aspect="equal", adjustable="box", xlim=(left, right), ylim=(bottom, top), xlabel=x, ylabel=y)
 
 
 @cache
@@ -55,15 +145,50 @@ def plot_series(axes: Axes, t: ArrayLike, series: Mapping[str, FloatArray], line
     return [handle for name, values in series.items() for handle in axes.plot(t, values, **{**line(name), **look})]
 
 
+def time_axis(panels: Sequence[Axes], t: FloatArray, style: Style = SCREEN) -> None:
+    """Labels the lowest panel and, on the screen, fits all to the recording of times t (T,), s."""
+    if style.titled:
+        panels[-1].set_xlim(0.0, float(t[-1]))
+    panels[-1].set_xlabel("time, s")
+
+
+def columns(tables: Mapping[str, Columns], column: str) -> dict[str, FloatArray]:
+    """Values (n,) of a column of each table."""
+    return {name: np.asarray(table[column]) for name, table in tables.items()}
+
+
+def component_panels(
+    tables: Mapping[str, Columns], t: Mapping[str, FloatArray], line: Line, style: Style = SCREEN
+) -> tuple[Figure, list[Axes], list[Any]]:
+    """Distance, angle and components of errors (see `compare.pose_errors`) over t, by name, and the lines' handles.
+
+    On paper distance and angle alone.
+    """
+    every = {c: columns(tables, c) for c in COMPONENTS if style.titled or c not in SIGNED}
+    shown = {c: series for c, series in every.items() if any(np.isfinite(v).any() for v in series.values())} or every
+    ratios = [1.7 if style.titled else 1.0, *[1.0] * (len(shown) - 1)]
+    height = 8.6 * sum(ratios) / 5.7 if style.titled else style.room + 0.95 * sum(ratios)
+    figure, axes = stacked_panels(height, len(shown), style, height_ratios=ratios)
+    handles: list[Any] = []
+    for panel, (column, series) in zip(axes, shown.items(), strict=True):
+        for name, values in series.items():
+            handles += panel.plot(t[name], values, **line(name))
+        panel.set_ylabel(COMPONENTS[column])
+        if column in SIGNED:
+            panel.axhline(0.0, color="#999999", linewidth=0.8, zorder=1.8)
+        else:
+            fit_log_or_linear(panel, series)
+            few_ticks(panel, style)
+    return figure, axes, handles
+
+
 def fit_log_or_linear(axes: Axes, series: Mapping[str, FloatArray]) -> None:
     """Logarithmic ordinate for positive values where the series differ by decades, else a linear one from zero."""
-    reach = {name: v[np.isfinite(v) & (v > 0)] for name, v in series.items()}
-    tops = [float(np.percentile(v, 95)) for v in reach.values() if len(v)]
-    if not tops:
-        return
-    if np.log10(max(tops) / min(tops)) > DECADES:
+    positive = [v[np.isfinite(v) & (v > 0)] for v in series.values()]
+    tops = [float(np.percentile(v, 95)) for v in positive if len(v)]
+    if tops and np.log10(max(tops) / min(tops)) > DECADES:
         fit_log(axes, series, decades=4.0)
-    else:
+    elif tops:
         axes.set_ylim(bottom=0.0)
 
 
@@ -76,6 +201,12 @@ def fit_log(axes: Axes, series: Mapping[str, FloatArray], decades: float = 6.0) 
     top = min(float(highest), 3.0 * float(high)) * 1.3
     axes.set_yscale("log")
     axes.set_ylim(max(float(low) / 1.5, top * 10.0**-decades), top)
+
+
+def widen_ordinate(axes: Axes, low: float, high: float) -> None:
+    """Widens the ordinate where it does not hold both values."""
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(min(bottom, low), max(top, high))
 
 
 def log_where_positive(axes: Axes) -> None:
@@ -99,16 +230,6 @@ def few_ticks(axes: Axes, style: Style) -> None:
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-def fit_signed(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray], reach: float) -> None:
-    """Linear ordinate out to `reach` on either side, with a note of which series (T,) leave it and when."""
-    values = np.concatenate([v[np.isfinite(v)] for v in series.values()] or [np.empty(0)])
-    low, high = (float(values.min()), float(values.max())) if len(values) else (-reach, reach)
-    low, high = max(low, -reach), min(high, reach)
-    margin = max(0.06 * (high - low), 1e-9)
-    axes.set_ylim(low - margin, high + margin)
-    note_out_of_range(axes, t, series, -reach, reach)
-
-
 def note_out_of_range(axes: Axes, t: FloatArray, series: Mapping[str, FloatArray], low: float, high: float) -> None:
     """Note of which series (T,), m, go beyond the panel, from when on and how far."""
     leaving = []
@@ -126,8 +247,7 @@ def chi_square_band(axes: Axes, degrees: float, label: str, *, per: float = 1.0,
     """Median and 95 % band of chi-square with so many degrees of freedom, over `per`; gives the band."""
     low, median, high = chi_square_limits(degrees, per)
     axes.axhline(median, color=GRAY, linestyle=":", linewidth=width, zorder=1.5)
-    bottom, top = axes.get_ylim()
-    axes.set_ylim(min(bottom, 0.7 * low), max(top, 1.4 * high))
+    widen_ordinate(axes, 0.7 * low, 1.4 * high)
     return axes.axhspan(low, high, color=BAND, zorder=1, linewidth=0, label=label)
 
 
@@ -146,6 +266,13 @@ def intervals(
     axes.grid(axis="y", visible=False)
 
 
-def short(text: str) -> str:
-    """Name of a class as a tick has room for it: `5 to 10 m` is 5–10 m."""
-    return text.replace(" and more", "+").replace(" to ", "–")
+def note(axes: Axes, text: str) -> None:
+    """Remark in the lower right corner of a panel."""
+    box = {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1.5}
+    place: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "va": "bottom"}
+    axes.text(0.995, 0.015, text, **place, fontsize=8.5, color="#444444", zorder=6, bbox=box)
+
+
+def swatch(color: str, text: str, size: float = 7.0) -> Line2D:
+    """Legend's entry for an area or a cloud of points."""
+    return Line2D([], [], color=color, marker="s", linestyle="none", markersize=size, label=text)

@@ -1,6 +1,7 @@
-"""Paths from above: over one another, side by side, and each with its landmarks."""
+"""Paths from above: over one another, side by side, and each with its landmarks; and their height over time."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,14 +12,21 @@ from fgbaseline.data.top_view import TopView
 from fgbaseline.data.wording import distance, plural
 from fgbaseline.geometry import FloatArray
 
-from .axis_limits import Window, common_window, known, robust_window
-from .legend import note, swatch, title_and_legend
-from .palette import GRAY, LANDMARK, TRUTH
+from .layout import title_and_legend
+from .panels import (
+    Window,
+    common_window,
+    frame_top_view,
+    known,
+    note,
+    note_out_of_range,
+    plot_series,
+    robust_window,
+    swatch,
+    time_axis,
+)
 from .run_data import RunData
-from .style import SCREEN, WHITE, Style, label, safe_text
-
-if TYPE_CHECKING:
-    from fgbaseline.compare.estimate_comparison import Run
+from .style import GRAY, LANDMARK, SCREEN, TRUTH, WHITE, Line, Style, label, safe_text, stacked_panels
 
 ARROWS = 40
 """along a path"""
@@ -29,12 +37,8 @@ ASPECT = (0.42, 1.1)
 PAPER_ASPECT, PAPER_SURROUNDINGS = (0.35, 1.2), (20.0, 0.15)
 MIN_MARGIN = 0.5
 """m of a margin, at least"""
-
-
-def frame_top_view(axes: Axes, box: Window, x: str = "", y: str = "") -> None:
-    """Frames a panel: equal scales, the box and the labels of its axes."""
-    (left, bottom), (right, top) = box.low, box.high
-    axes.set(aspect="equal", adjustable="box", xlim=(left, right), ylim=(bottom, top), xlabel=x, ylabel=y)
+MIN_HEIGHT_RANGE = 0.1
+"""height over extent, up to which any path is shown"""
 
 
 def paths_overlaid(run: RunData, style: Style = SCREEN) -> Figure:
@@ -44,21 +48,33 @@ def paths_overlaid(run: RunData, style: Style = SCREEN) -> Figure:
     paths, truth = _flat(run)
     box = common_window(paths.values(), truth).shaped(ASPECT, MIN_MARGIN)
     figure, (axes,) = _panels(box, 1, 1)
-    line = run.line()
-    handles = axes.plot(*truth.T, **style.truth) if truth is not None else []
-    for name, path in paths.items():
-        handles += axes.plot(*path.T, **line(name))
-        axes.plot(*known(path)[-1:].T, "s", color=run.colors[name], markersize=5, zorder=4, clip_on=True)
-    if truth is not None:
-        axes.plot(*known(truth)[-1:].T, "s", color=TRUTH, markersize=5, zorder=3)
-    handles += axes.plot(0.0, 0.0, "o", markersize=8, label="start", **WHITE)
-    handles.append(swatch(GRAY, "end"))
+    handles = overlaid(axes, paths, run.line(), style, truth)
     frame_top_view(axes, box, "ahead of the start, m", "left of the start, m")
     title_and_legend(figure, "All trajectories from above", handles)
     remarks = [f"{safe_text(name)}: {remark}" for name, path in paths.items() for remark in _outside(box, path, "pose")]
     if remarks:
         note(axes, "; ".join(remarks) + " outside the panel")
     return figure
+
+
+def overlaid(
+    axes: Axes,
+    paths: Mapping[str, FloatArray],
+    line: Line,
+    style: Style,
+    truth: FloatArray | None = None,
+    start: str = "start",
+) -> list[Any]:
+    """Draws paths (n, 2) from a common start, which is named, and on the screen their ends; gives the handles."""
+    handles = axes.plot(*truth.T, **style.truth) if truth is not None else []
+    for name, path in paths.items():
+        handles += axes.plot(*path.T, **line(name))
+    for name, path in paths.items() if style.titled else ():
+        axes.plot(*known(path)[-1:].T, "s", color=line(name)["color"], markersize=5, zorder=4)
+    if truth is not None and style.titled:
+        axes.plot(*known(truth)[-1:].T, "s", color=TRUTH, markersize=5, zorder=3)
+    handles += axes.plot(0.0, 0.0, "o", markersize=8 if style.titled else 4, label=start, **WHITE)
+    return [*handles, swatch(GRAY, "end")] if style.titled else handles
 
 
 def estimator_with_landmarks(run: RunData) -> str | None:
@@ -79,7 +95,9 @@ def path_with_landmarks(run: RunData, name: str | None, style: Style = SCREEN) -
     handles = [_draw_landmarks(axes, landmarks)] if len(landmarks) else []
     handles += axes.plot(*path.T, **run.line()(name))
     if run.run is not None:
-        handles.append(_draw_orientation(axes, path, _directions(run.run, name), run.colors[name]))
+        problem, world_R_imu = run.run.problem, run.run.results[name].estimate.world_T_imu[:, :3, :3]
+        optical_axis = TopView.of(problem).plane(world_R_imu @ problem.sequence.imu_T_cam[:3, 2])
+        handles.append(_draw_orientation(axes, path, optical_axis, run.colors[name]))
     handles += _draw_ends(axes, path)
     frame_top_view(axes, box, "ahead of the start, m", "left of the start, m")
     title_and_legend(figure, f"{label(name, run.reference)}: trajectory from above and landmarks", handles)
@@ -122,6 +140,24 @@ def paths_side_by_side(run: RunData) -> Figure:
     return figure
 
 
+def height(run: RunData) -> Figure:
+    """Height above the start over time."""
+    heights = {name: path[:, 2] for name, path in run.paths.items()}
+    true = None if run.truth is None else run.truth[:, 2]
+    figure, (axes,) = stacked_panels(3.4)
+    handles = axes.plot(run.t, true, **SCREEN.truth) if true is not None else []
+    handles += plot_series(axes, run.t, heights, run.line())
+    least = MIN_HEIGHT_RANGE * common_window(run.paths.values(), run.truth).side
+    box = common_window([h[:, None] for h in heights.values()], None if true is None else true[:, None], least)
+    box = box.grown(0.06 * box.side + 0.05)
+    low, high = float(box.low[0]), float(box.high[0])
+    axes.set(ylim=(low, high), ylabel="height, m")
+    note_out_of_range(axes, run.t, heights, low, high)
+    time_axis([axes], run.t)
+    title_and_legend(figure, "Height above the start", handles)
+    return figure
+
+
 def _paper_paths(run: RunData, style: Style, names: tuple[str, ...], points: FloatArray | None = None) -> Figure:
     """Paths and landmarks (m, 2) in one column, without marks that a caption explains."""
     paths, truth = _flat(run)
@@ -138,12 +174,7 @@ def _paper_paths(run: RunData, style: Style, names: tuple[str, ...], points: Flo
         x, y = points[box.holds(points)].T
         axes.scatter(x, y, s=0.6, color=LANDMARK, linewidths=0, rasterized=True)
         handles.append(swatch(LANDMARK, "landmarks", 3.0))
-    if truth is not None:
-        handles += axes.plot(*truth.T, **style.truth)
-    line = run.line(style)
-    for name, path in paths.items():
-        handles += axes.plot(*path.T, **line(name))
-    handles += axes.plot(0.0, 0.0, "o", markersize=4, label="start", **WHITE)
+    handles += overlaid(axes, paths, run.line(style), style, truth)
     frame_top_view(axes, box, "ahead of the start, m", "to its left, m")
     title_and_legend(figure, "", handles, style)
     return figure
@@ -164,20 +195,13 @@ def _panels(box: Window, rows: int, columns: int) -> tuple[Figure, list[Axes]]:
 
 
 def _draw_landmarks(axes: Axes, landmarks: FloatArray, size: float = 3.0) -> Line2D:
-    axes.scatter(
-        landmarks[:, 0], landmarks[:, 1], s=size, color=LANDMARK, linewidths=0, alpha=0.7, rasterized=True, zorder=1.5
-    )
+    x, y = landmarks.T
+    axes.scatter(x, y, s=size, color=LANDMARK, linewidths=0, alpha=0.7, rasterized=True, zorder=1.5)
     return swatch(LANDMARK, plural(len(landmarks), "landmark"))
 
 
-def _directions(run: "Run", name: str) -> FloatArray:
-    """Viewing directions (T, 2) of the camera from above."""
-    optical_axis = run.problem.sequence.imu_T_cam[:3, 2]
-    return TopView.of(run.problem).plane(run.results[name].estimate.world_T_imu[:, :3, :3] @ optical_axis)
-
-
 def _draw_orientation(axes: Axes, path: FloatArray, directions: FloatArray, color: str) -> Line2D:
-    """Arrows along the optical axis, at some of the frames, and their entry in the legend."""
+    """Arrows along the optical axis (T, 2), at some of the frames, and their entry in the legend."""
     there = np.flatnonzero(np.isfinite(path).all(axis=1))
     chosen = there[:: max(1, len(there) // ARROWS)]
     look: dict[str, Any] = {"scale": 32, "width": 0.0028, "headwidth": 5, "headlength": 6, "alpha": 0.75, "zorder": 3}

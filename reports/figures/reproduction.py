@@ -21,10 +21,9 @@ from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
 from ..formatting import meters
-from .axis_limits import Window, common_window, known, robust_window
 from .drawing import DrawOne, drawn
-from .legend import note, swatch, title_and_legend
-from .paths import frame_top_view
+from .layout import title_and_legend
+from .panels import Window, common_window, frame_top_view, known, note, robust_window, swatch
 from .style import SCREEN, safe_text
 
 if TYPE_CHECKING:
@@ -40,8 +39,6 @@ AROUND = 0.25
 """share of the path's extent: landmarks farther off are counted and not shown"""
 SQUARE = (0.6, 1.0 / 0.6)
 """height over width of a picture as in the source paper, at least and at most"""
-TITLE = 62
-"""letters of a line of a title"""
 COLUMNS = 2
 MARGIN = 1.1
 """factor on the largest box: all stages have one scale"""
@@ -114,14 +111,8 @@ def plot(title: str, path: FloatArray, *, arrows: bool = False, landmarks: Float
     width, height = box.high - box.low
     figure.set_size_inches(SIDE, (SIDE - 0.7) * height / width + HEAD)
     frame_top_view(axes, box, "x, m", "y, m")
-    title_and_legend(figure, _in_two_lines(title), handles)
+    title_and_legend(figure, title, handles)
     return figure
-
-
-def _in_two_lines(title: str) -> str:
-    """A long title broken at its last comma that the first line has room for, if there is one."""
-    cut = title.rfind(", ", 0, TITLE) + 1 if len(title) > TITLE else 0
-    return f"{title[:cut]}\n{title[cut + 1 :]}" if cut > 1 else title
 
 
 def _arrows(axes: Axes, path: FloatArray) -> None:

@@ -7,59 +7,55 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from .drawing import Captioned, DrawOne, drawn, drawn_for_paper, encoded_in_background
-from .evidence import consistency, held_out, map_difference, nees, three_sigma, velocity_and_biases
-from .over_time import divergence, error_to_truth, height, time_per_frame
+from . import over_time, paths, residuals
+from .drawing import Captioned, DrawOne, EncodedFigure, drawn, drawn_for_paper, encoded_in_background
 from .panels import smoothed
-from .paths import estimator_with_landmarks, path_with_landmarks, paths_overlaid, paths_side_by_side
-from .reprojection import image_regions, reprojection_classes, reprojection_distribution, reprojection_over_time
 from .run_data import RunData, of_run
-from .saving import EncodedFigure
 
 if TYPE_CHECKING:
     from fgbaseline.compare.estimate_comparison import Run
 
 OVER_TIME: tuple[Callable[[RunData], Figure | None], ...] = (
-    divergence,
-    error_to_truth,
-    height,
-    reprojection_over_time,
-    reprojection_distribution,
-    nees,
-    time_per_frame,
-    held_out,
-    consistency,
-    reprojection_classes,
-    image_regions,
-    map_difference,
+    over_time.divergence,
+    over_time.error_to_truth,
+    paths.height,
+    residuals.reprojection_over_time,
+    residuals.reprojection_distribution,
+    over_time.nees,
+    over_time.time_per_frame,
+    residuals.held_out,
+    over_time.consistency,
+    residuals.reprojection_classes,
+    residuals.image_regions,
+    residuals.map_difference,
 )
 """each gives None where the run has no data for it"""
 PAPER_FIGURES: Captioned = {
-    "paths": (paths_overlaid, "Trajectories on {sequence} from above."),
+    "paths": (paths.paths_overlaid, "Trajectories on {sequence} from above."),
     "landmarks": (
-        lambda run, style: path_with_landmarks(run, estimator_with_landmarks(run), style),
+        lambda run, style: paths.path_with_landmarks(run, paths.estimator_with_landmarks(run), style),
         "Trajectory and landmarks of {mapped} on {sequence} from above.",
     ),
     "divergence": (
-        divergence,
+        over_time.divergence,
         "Position and rotation divergence from the reference, {reference} ({trust}), on {sequence}, without alignment.",
     ),
-    "error_to_truth": (error_to_truth, "Error to ground truth on {sequence}, without alignment."),
+    "error_to_truth": (over_time.error_to_truth, "Error to ground truth on {sequence}, without alignment."),
     "reprojection": (
-        reprojection_over_time,
+        residuals.reprojection_over_time,
         "Median reprojection error of each frame of {sequence} (norm of the four pixel differences){smoothed}.",
     ),
     "consistency": (
-        consistency,
+        over_time.consistency,
         "Consistency on {sequence}, with the 95 % chi-square band of a consistent estimator; "
         "sigma ratios of the position are to {reference}{smoothed_nis}.",
     ),
-    "held_out": (held_out, "Median held-out error on {sequence}, with 95 % intervals."),
+    "held_out": (residuals.held_out, "Median held-out error on {sequence}, with 95 % intervals."),
     "map_difference": (
-        map_difference,
+        residuals.map_difference,
         "Median distance of landmarks from those of {reference}, in the camera frame, by depth.",
     ),
-    "time_per_frame": (time_per_frame, "Time per frame on {sequence}{smoothed}."),
+    "time_per_frame": (over_time.time_per_frame, "Time per frame on {sequence}{smoothed}."),
 }
 
 
@@ -73,13 +69,14 @@ def figure_functions(run: RunData) -> dict[str, DrawOne]:
     """
     if not run.names:
         return {}
-    figures: dict[str, DrawOne] = {one.__name__: partial(one, run) for one in (paths_overlaid, paths_side_by_side)}
-    figures |= {f"path_{name}": partial(path_with_landmarks, run, name) for name in run.names}
+    every = paths.paths_overlaid, paths.paths_side_by_side
+    figures: dict[str, DrawOne] = {one.__name__: partial(one, run) for one in every}
+    figures |= {f"path_{name}": partial(paths.path_with_landmarks, run, name) for name in run.names}
     figures |= {one.__name__: partial(one, run) for one in OVER_TIME}
     for r in run.answered:
         error, covariance, look = r.evidence.error, r.estimate.covariance, run.line()(r.name)
-        figures[f"three_sigma_{r.name}"] = partial(three_sigma, r.name, run.t, error, covariance, look)
-        figures[f"velocity_and_biases_{r.name}"] = partial(velocity_and_biases, run, r.name)
+        figures[f"three_sigma_{r.name}"] = partial(over_time.three_sigma, r.name, run.t, error, covariance, look)
+        figures[f"velocity_and_biases_{r.name}"] = partial(over_time.velocity_and_biases, run, r.name)
     return figures
 
 
@@ -97,7 +94,7 @@ def draw_for_paper(run: RunData) -> dict[str, tuple[Figure, str]]:
         "sequence": run.sequence,
         "reference": str(run.reference),
         "trust": run.trust,
-        "mapped": estimator_with_landmarks(run) or "",
+        "mapped": paths.estimator_with_landmarks(run) or "",
     }
     return drawn_for_paper(run, PAPER_FIGURES, words)
 

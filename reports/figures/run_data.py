@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fgbaseline import compare
+from fgbaseline.compare.column_tables import Columns, of_frame
 from fgbaseline.data.formats.file_errors import reading
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..results.json_files import SUMMARY, document_in
 from ..results.reader import RunFolder
-from .palette import colors
-from .style import SCREEN, Line, Style, lines
+from .style import SCREEN, Line, Style, colors, lines
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,6 +76,11 @@ class RunData:
         without = self.reference if name.startswith("divergence_") else None
         values = {n: s[name].to_numpy(dtype=np.float64) for n, s in self.series.items() if name in s and n != without}
         return {n: v for n, v in values.items() if np.isfinite(v).any()}
+
+    def errors(self, name: str, of: str) -> Columns:
+        """Columns `OF_...` of an estimator's series without that beginning: see `compare.pose_errors`."""
+        columns = of_frame(self.series[name])
+        return {c.removeprefix(f"{of}_"): values for c, values in columns.items() if c.startswith(f"{of}_")}
 
     def milliseconds(self) -> dict[str, FloatArray]:
         """Time per frame (T,), ms, of each estimator that measured it."""

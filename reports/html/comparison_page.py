@@ -1,22 +1,28 @@
-"""Page of a comparison."""
+"""Page of a comparison, and the data of its plots in the form of a run's (see `plot_data.page_data`)."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
-from fgbaseline.compare.trajectory_comparison.comparison import Comparison
+from fgbaseline import compare
+from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
+from fgbaseline.compare.trajectory_comparison.inputs import Entry
+from fgbaseline.geometry import FloatArray
 
-from ..figures.comparison_data import of_comparison
-from ..figures.saving import EncodedFigure
-from ..formatting import counted, listed, number
+from ..figures.comparison_data import ComparisonData, of_comparison
+from ..figures.drawing import EncodedFigure
+from ..figures.panels import DEGREES_OF_FREEDOM
+from ..formatting import counted, distance, listed, number
 from ..phrases.comparison import verdict
 from ..results.comparison import Summary
 from ..tables.comparison import comparison_table
-from ..tables.table import Row
-from .comparison_plots import comparison_plots
-from .page import Folded, Grid, Live, Page, Section, figure_blocks, pictures, still_figures, trust
-from .rendering import render_page
+from ..tables.table import Cell
+from .page import Folded, Grid, Live, Page, Section, figure_blocks, pictures, render_page, still_figures, trust
+from .plot_encoding import Chart, Lines, chart, expected, floats, grouped, integers, numbered, position_covariances
 
 CAPTIONS: Mapping[str, str] = {
     "paths": "Aligned as the caption of the table describes, seen from above.",
@@ -43,6 +49,12 @@ ABSENT: Mapping[str, str] = {"nees": "NEES", "passing": "first pose above the th
 """words for keys of missing values that do not explain themselves"""
 STILLS = ("paths", "errors")
 """figures that show what the interactive plots show"""
+MOMENTS = 4000
+"""largest number of positions of the slider"""
+REFERENCE_MOMENTS = 1000
+"""poses of the reference among them, at most, where no estimate has a pair"""
+GAP = 10.0
+"""usual intervals of an estimate without a pose, from which on its line is broken"""
 
 
 def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figure | EncodedFigure]) -> str:
@@ -51,7 +63,11 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
     reference, estimates, data = summary.reference, summary.estimates, of_comparison(comparison)
     table = comparison_table(comparison, summary.by_name, summary.caption, mark_reference=True)
     drawn = pictures(figures, CAPTIONS)
-    notes = {name: estimate.notes for name, estimate in estimates.items() if estimate.notes}
+    missing = {
+        f"{name}: {ABSENT.get(key, key.replace('_', ' '))}": why
+        for name, estimate in estimates.items()
+        for key, why in estimate.notes.items()
+    }
     sources = {reference.name: reference.source, **{name: estimate.source for name, estimate in estimates.items()}}
     bands = [p for name, p in drawn.items() if name.startswith("three_sigma_")]
     beyond = [p for name, p in drawn.items() if not name.startswith((*STILLS, "growth", "three_sigma_"))]
@@ -61,7 +77,7 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
             table,
             name="metric",
             caption=f"{table.caption} {BEST[comparison.ranking.same]}",
-            rows=tuple(_with_intervals_below(row) for row in table.rows),
+            rows=tuple(replace(row, cells=tuple(map(_with_interval_below, row.cells))) for row in table.rows),
         )
     )
     behind = None if reference.trust is None else trust(reference.name, reference.trust, reference.reasons)
@@ -75,19 +91,11 @@ def render(comparison: Comparison, summary: Summary, figures: Mapping[str, Figur
             table=Section("table", "Metrics by estimate", [grid], "Metrics"),
             sections=[
                 Section("behind", "Trust in the reference", [behind] if behind is not None else []),
-                Section(
-                    "over-time",
-                    "Over time",
-                    [Live("charts"), *figure_blocks(drawn, ["growth"])],
-                ),
-                Section(
-                    "evidence",
-                    _beyond_title(drawn, bool(bands)),
-                    [*beyond, *folded],
-                ),
+                Section("over-time", "Over time", [Live("charts"), *figure_blocks(drawn, ["growth"])]),
+                Section("evidence", _beyond_title(drawn, bool(bands)), [*beyond, *folded]),
                 Section("stills", "Static figures", [still_figures(stills)] if stills else []),
             ],
-            settings={"Missing values": _named(notes), "Files": sources, "Settings": settings},
+            settings={"Missing values": missing, "Files": sources, "Settings": settings},
             colors=data.colors,
             plots=comparison_plots(comparison, data),
             still_paths=drawn.get("paths"),
@@ -115,12 +123,129 @@ def _beyond_title(names: Iterable[str], has_bands: bool) -> str:
     return title[:1].upper() + title[1:]
 
 
-def _named(notes: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
-    """The notes of all estimates, by estimate and the words for their keys."""
-    every = ((name, key, why) for name, of in notes.items() for key, why in of.items())
-    return {f"{name}: {ABSENT.get(key, key.replace('_', ' '))}": why for name, key, why in every}
+def _with_interval_below(cell: Cell) -> Cell:
+    """Cell with its interval on a line below its value."""
+    return cell._replace(text=cell.text.replace(" [", "\n["))
 
 
-def _with_intervals_below(row: Row) -> Row:
-    """The row with each interval on a line below its value."""
-    return replace(row, cells=tuple(cell._replace(text=cell.text.replace(" [", "\n[")) for cell in row.cells))
+def comparison_plots(comparison: Comparison, data: ComparisonData) -> dict[str, Any]:
+    """Everything at the moments of the pairs of poses, between which an estimate is interpolated as a line is drawn."""
+    own = np.asarray(comparison.reference.trajectory.t - comparison.reference.trajectory.t[0])
+    t = _moments(data, own)
+    lines = {data.reference: _at(t, own, data.paths[data.reference])}
+    lines |= {name: _at(t, data.t[name], data.paths[name]) for name in data.names}
+    entries: dict[str, tuple[Entry, Result | None]] = {data.reference: (comparison.reference, None)}
+    entries |= {name: (result.entry, result) for name, result in comparison.results.items()}
+    start = comparison.reference.trajectory.position[0]
+    return {
+        "frames": len(t),
+        "step": "stamp" if data.stamped else "frame",
+        "stamped": data.stamped,
+        "axes": list(data.axes),
+        "t": floats(t),
+        "reference": data.reference,
+        "estimators": [_estimator(data, *of, lines[name], t, start) for name, of in entries.items()],
+        "truth": None,
+        "camera": None,
+        "observations": None,
+        "reasons": {},
+        "charts": _charts(comparison, data, t, lines),
+        "bookmarks": _bookmarks(comparison, data, t),
+    }
+
+
+def _moments(data: ComparisonData, own: FloatArray) -> FloatArray:
+    """Times of all pairs and of some of the reference's poses; evenly thinned where they are too many."""
+    some = own[:: -(-len(own) // REFERENCE_MOMENTS)]
+    t = np.unique(np.concatenate([some, own[-1:], *data.t.values()]))
+    return np.asarray(t[:: -(-len(t) // MOMENTS)])
+
+
+def _at(t: FloatArray, known: FloatArray, values: ArrayLike) -> FloatArray:
+    """Values (n,) or (n, d) of rising times `known` (n,) at times t: linear between neighbors, NaN across gaps."""
+    every = np.asarray(values, dtype=np.float64)
+    after = np.clip(np.searchsorted(known, t), 0, len(known) - 1)
+    before = np.where(known[after] == t, after, np.maximum(after - 1, 0))
+    span = known[after] - known[before]
+    usual = float(np.median(np.diff(known))) if len(known) > 1 else 0.0
+    inside = (t >= known[0]) & (t <= known[-1]) & (span <= GAP * usual)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(span > 0, (t - known[before]) / span, 0.0)
+    share, inside = (part.reshape(-1, *[1] * (every.ndim - 1)) for part in (share, inside))
+    return np.where(inside, every[before] + share * np.where(share > 0, every[after] - every[before], 0.0), np.nan)
+
+
+def _estimator(
+    data: ComparisonData, entry: Entry, result: Result | None, path: FloatArray, t: FloatArray, start: FloatArray
+) -> dict[str, Any]:
+    """A trajectory: path, position covariances and landmarks, as far as they came with it."""
+    view = data.view
+    about: dict[str, Any] = {"name": entry.name, "answered": True, "path": floats(path)}
+    about |= {"cameras": None, "covariance": None, "landmarks": None, "points": None, "used": None}
+    if result is not None and result.reported_covariance is not None:
+        body = np.stack([view.ahead, view.left, view.up]) @ result.matched.estimate.rotation
+        P = position_covariances(body, result.reported_covariance.covariance)
+        about["covariance"] = floats(_at(t, data.t[entry.name], P))
+    if entry.landmarks is not None and len(entry.landmarks):
+        points = entry.landmarks.position
+        if result is not None:
+            motion = result.matched.alignment
+            points = motion.scale * points @ motion.rotation.T + motion.translation
+        about["landmarks"] = integers(entry.landmarks.index)
+        about["points"] = floats(view.scene(points - start))
+    return about
+
+
+def _charts(comparison: Comparison, data: ComparisonData, t: FloatArray, paths: Lines) -> list[Chart]:
+    """The charts in their order; those without lines are left out."""
+    of, how = data.reference, data.alignment
+
+    def lines(values: Lines) -> Lines:
+        return numbered((of, *data.names), values)
+
+    def difference(name: str, title: str, unit: str, column: str) -> Chart | None:
+        table = {n: _at(t, data.t[n], table[column]) for n, table in data.series.items()}
+        return chart(name, title, unit, lines(table))
+
+    reported = {n: r.reported_covariance for n, r in comparison.results.items()}
+    nees = {n: _at(t, data.t[n], covariance.nees) for n, covariance in reported.items() if covariance is not None}
+    poses = expected(DEGREES_OF_FREEDOM, "poses of a consistent estimator") if nees else {}  # needs scipy
+    heights, medians = {n: path[:, 2] for n, path in paths.items()}, _pixels(comparison, t)
+    along = {"log": True, "smooth": True, "hint": "with landmarks triangulated along each path"}
+    groups = {
+        "Position and rotation": [
+            difference("divergence", f"Position error against {of}, {how}", "m", "position"),
+            difference("rotation", f"Rotation error against {of}, {how}", "°", "rotation_deg"),
+            difference("along", f"Ahead of {of}", "m", "along"),
+            difference("across", f"To the left of {of}", "m", "across"),
+            difference("above", f"Above {of}", "m", "up"),
+            difference("heading", f"Heading error against {of}, left positive", "°", "heading_deg"),
+            chart("height", "Height above the reference's start", "m", lines(heights)),
+        ],
+        "Consistency": [chart("nees", "NEES", "", lines(nees), **poses)],
+        "Pixels": [chart("reprojection", "Median reprojection error by frame", "px", lines(medians), **along)],
+    }
+    return grouped(groups)
+
+
+def _pixels(comparison: Comparison, t: FloatArray) -> Lines:
+    """Median error of each frame, px, with landmarks triangulated along the path."""
+    sequence, lines = comparison.sequence, {}
+    for name, pixels in comparison.pixels.items():
+        if sequence is not None and pixels.along is not None and len(pixels.along):
+            medians = compare.reprojection_by(pixels.along, "frame")["median"].reindex(range(sequence.n_frames))
+            lines[name] = _at(t, sequence.t - comparison.reference.trajectory.t[0], medians)
+    return lines
+
+
+def _bookmarks(comparison: Comparison, data: ComparisonData, t: FloatArray) -> list[dict[str, Any]]:
+    """Moments of the first poses beyond the threshold, and of the largest errors where there is none."""
+    found = []
+    for name, result in comparison.results.items():
+        position = result.divergence["position"]
+        first = result.passing is not None
+        k = result.passing.frame if result.passing is not None else int(np.nanargmax(position))
+        far = result.bound if first else position[k]
+        text = f"{name} {'first' if first else 'farthest,'} {distance(far)} from {data.reference}"
+        found.append({"frame": int(np.argmin(np.abs(t - data.t[name][k]))), "text": text})
+    return sorted(found, key=lambda bookmark: int(bookmark["frame"]))

@@ -1,4 +1,4 @@
-"""Numbers of plots as a page has them, packed as base64, and the charts made of them."""
+"""Plots as a page has them: numbers packed as base64, the charts made of them, and the styles of lines."""
 
 from base64 import b64encode
 from collections.abc import Iterable, Mapping
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from fgbaseline.geometry import FloatArray
 
 from ..figures.panels import chi_square_limits
+from ..figures.style import DASHES, on_dark
 
 FINEST = 16
 """parts of a pixel that observations are rounded to, unless the image is too large for that"""
@@ -19,10 +20,9 @@ FINEST = 16
 
 def floats(values: ArrayLike) -> str:
     """Single precision; NaN for what is not finite."""
-    array = np.asarray(values, dtype=np.float64)
     with np.errstate(over="ignore"):
-        single = np.where(np.isfinite(array), array, np.nan).astype("<f4")
-    return _text(np.where(np.isfinite(single), single, np.nan).astype("<f4"))
+        single = np.asarray(values, dtype=np.float64).astype("<f4")
+    return _text(np.where(np.isfinite(single), single, np.float32(np.nan)))
 
 
 def integers(values: ArrayLike, bits: int = 32) -> str:
@@ -109,3 +109,23 @@ def position_covariances(view_R_body: FloatArray, covariance: FloatArray) -> Flo
     P = view_R_body @ covariance[:, :3, :3] @ np.swapaxes(view_R_body, 1, 2)
     row, column = np.triu_indices(3)
     return np.asarray(P[:, row, column])
+
+
+def line_rules(colors: Mapping[str, str]) -> Markup:
+    """`.estimator-KEY` sets `--estimator`, `--dash` and the `--sample` of a legend by the color of its line."""
+    rules = "\n".join(f".estimator-{key} {{ {_line_style(color)} }}" for key, color in colors.items())
+    dark = "\n".join(f".estimator-{key} {{ --estimator: {on_dark(color)}; }}" for key, color in colors.items())
+    return Markup(f"{rules}\n@media screen and (prefers-color-scheme: dark) {{\n{dark}\n}}")
+
+
+def _line_style(color: str) -> str:
+    lengths = DASHES.get(color, ())
+    if not lengths:
+        return f"--estimator: {color}; --dash: none; --sample: linear-gradient(var(--estimator) 0 0);"
+    ends = np.cumsum(lengths)
+    stops = [
+        f"{'transparent' if i % 2 else 'var(--estimator)'} {end - length:g}px {end:g}px"
+        for i, (length, end) in enumerate(zip(lengths, ends.tolist(), strict=True))
+    ]
+    dash = " ".join(f"{length:g}" for length in lengths)
+    return f"--estimator: {color}; --dash: {dash}; --sample: repeating-linear-gradient(90deg, {', '.join(stops)});"

@@ -1,4 +1,4 @@
-"""Page of a run."""
+"""Pages of a run and of a diagnosis."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,10 +9,11 @@ from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data.tracking import Pictures
 from fgbaseline.data.wording import capitalized
 
-from ..figures import EncodedFigure
-from ..figures.palette import colors
+from ..figures.drawing import EncodedFigure
+from ..figures.style import colors
 from ..formatting import counted, number
 from ..phrases.run import track_sentences, verdict
+from ..results.diagnosis import Found
 from ..tables import run as tables
 from ..tables import run_details as details
 from .page import (
@@ -28,12 +29,12 @@ from .page import (
     figure_blocks,
     folded,
     pictures,
+    render_page,
     still_figures,
     trust,
 )
 from .plot_data import image_data, page_data
 from .plot_encoding import embedded_json
-from .rendering import render_page
 
 CAPTIONS: Mapping[str, str] = {
     "paths_overlaid": "Seen from above; all have the same start. Squares mark the ends.",
@@ -68,6 +69,16 @@ CAPTIONS: Mapping[str, str] = {
     "time_per_frame": "Below the dotted line an estimator runs in real time.",
 }
 """captions by the names of figures"""
+DIAGNOSIS_CAPTIONS: Mapping[str, str] = {
+    "angular_rates": "About the IMU axes that imu_T_cam assumes, as moving averages. With the repairs the rates "
+    "should follow visual odometry; where only visual odometry jumps, tracks are wrong.",
+    "conventions": "Bars: by how much a convention of axes and signs is less likely than the best one. Differences in "
+    "axes that are not identifiable do not count: of conventions that differ in these alone, the recorded one is kept.",
+    "time_offset": "Agreement of the recorded rates with visual odometry, 1 for equal rates, at each time offset. "
+    "The estimate is at its maximum; dotted lines mark the usual conventions.",
+    "velocity_residuals": "Residuals of the velocities over the estimated noise, beside a normal distribution.",
+    "tracks": "Features of each frame, and the share of its matches that contradict the motion.",
+}
 
 PAGE_BYTES = 20_000_000
 """largest page with images; they are thinned to what its plots and figures leave"""
@@ -198,3 +209,23 @@ def _behind(run: Run, plots: Mapping[str, Any] | None) -> list[Block]:
         inner += [Note("Repairs (the same for all estimators)", is_heading=True), Sentences(repairs, "repairs")]
     title = f"The recording: {found if problem.diagnosed or findings.rows else 'it could not be diagnosed'}"
     return [*blocks, Folded(title, inner, "diagnosis", is_open=bool(findings.rows))]
+
+
+def render_diagnosis(found: Found, figures: Mapping[str, Figure]) -> str:
+    """`report.html` of a diagnosis."""
+    sequence, table = found.sequence, details.findings_table(found.findings)
+    unknown = [Sentences(found.not_identifiable, "unknown")] if found.not_identifiable else []
+    return render_page(
+        Page(
+            kind="diagnosis",
+            title=sequence.name,
+            about=f"{found.counts}.",
+            verdict=[*found.verdict, *found.sentences],
+            table=Section("table", "Faults", [Grid(table, "plain findings")] if table.rows else []),
+            sections=[
+                Section("unknown", "Not identifiable in this recording", unknown, "Not identifiable"),
+                Section("figures", "Figures", list(pictures(figures, DIAGNOSIS_CAPTIONS).values())),
+            ],
+            settings={"Recording": {"name": sequence.name, "source": sequence.source, "format": sequence.form}},
+        )
+    )

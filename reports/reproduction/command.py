@@ -21,8 +21,7 @@ from fgbaseline.geometry import InputError
 from ..figures import save
 from ..figures.reproduction import draw
 from ..formatting import meters, number, per_cent
-from ..html.page import Block, Grid, Note, Page, Pair, Section, pictures
-from ..html.rendering import render_page
+from ..html.page import Block, Grid, Note, Page, Pair, Section, pictures, render_page
 from ..progress import reporter
 from ..results.glossary import INERTIAL_TERMS, TERMS
 from ..tables.table import Column, Row, Table, numbers, words

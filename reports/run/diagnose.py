@@ -63,7 +63,7 @@ def print_diagnosis(
 def _write(found: Found, text: str, out: Path, *, force: bool) -> None:
     from fgbaseline.reports import figures
 
-    from ..html.diagnosis_page import render
+    from ..html.run_page import render_diagnosis
 
     with atomic_folder(out, force=force, mark=MARK) as folder:
         drawn = {}
@@ -71,7 +71,7 @@ def _write(found: Found, text: str, out: Path, *, force: bool) -> None:
             drawn = figures.draw_diagnosis(found.diagnosis, found.tracks)
             (folder / "figures").mkdir()
             figures.save(drawn, folder / "figures")
-        (folder / "report.html").write_text(render(found, drawn), encoding="utf-8")
+        (folder / "report.html").write_text(render_diagnosis(found, drawn), encoding="utf-8")
         (folder / MARK).write_text(text, encoding="utf-8")
 
 

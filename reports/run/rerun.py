@@ -10,7 +10,7 @@ import numpy as np
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.geometry import FloatArray, InputError, so3
 
-from ..figures.palette import TRUTH, colors, on_dark
+from ..figures.style import TRUTH, colors, on_dark
 
 
 def require_rerun(file: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from fgbaseline.reports.figures import comparison, drawing, layout, run, saving
+from fgbaseline.reports.figures import comparison, drawing, layout, run
 from fgbaseline.reports.figures.run import figure_functions
 from fgbaseline.reports.figures.run_data import RunData
 
@@ -39,7 +39,7 @@ def figures_left_empty(patch: pytest.MonkeyPatch) -> None:
         return dict.fromkeys(figure_functions(data), Figure)
 
     patch.setattr(Figure, "savefig", savefig)
-    patch.setattr(saving, "_png", lambda *_: empty["png"])
+    patch.setattr(drawing, "_png", lambda *_: empty["png"])
     patch.setattr(layout, "fill_grid", lambda _: None)
     patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
     patch.setattr(run, "figure_functions", blank)

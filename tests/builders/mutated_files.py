@@ -21,8 +21,8 @@ import pytest
 from fgbaseline import data, diagnosis, ekf
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.reports import html
-from fgbaseline.reports.html import rendering
-from fgbaseline.reports.html.rendering import environment
+from fgbaseline.reports.html import page
+from fgbaseline.reports.html.page import environment
 
 from .commands import fgbaseline
 from .empty_figures import figures_left_out
@@ -205,7 +205,7 @@ class _Commands:
             os.sched_setaffinity(0, {cores[os.getpid() % len(cores)]})
             patch = pytest.MonkeyPatch()
             figures_left_out(patch)
-            patch.setattr(rendering, "environment", _templates)
+            patch.setattr(page, "environment", _templates)
 
 
 @cache

@@ -19,11 +19,10 @@ from fgbaseline.data import Excluded, Observations
 from fgbaseline.data.top_view import TopView
 from fgbaseline.reports import figures
 from fgbaseline.reports.figures.layout import lay_out
-from fgbaseline.reports.figures.palette import ESTIMATOR_COLORS
-from fgbaseline.reports.figures.reprojection import BANDS, observations_by_frame
+from fgbaseline.reports.figures.residuals import BANDS, observations_by_frame
 from fgbaseline.reports.figures.run import figure_functions
 from fgbaseline.reports.figures.run_data import of_run
-from fgbaseline.reports.figures.style import SCREEN, in_style, safe_text
+from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, SCREEN, in_style, safe_text
 
 from ..builders.runs import answer, failed, partly_known, run_of, scene, standard_run
 from ..builders.synthetic import plain_problem

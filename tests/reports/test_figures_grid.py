@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from fgbaseline.reports.figures.layout import lay_out
-from fgbaseline.reports.figures.legend import title_and_legend
+from fgbaseline.reports.figures.layout import lay_out, title_and_legend
 from fgbaseline.reports.figures.style import in_style, stacked_panels
 
 AWAY = 0.02

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.reports import figures
-from fgbaseline.reports.figures.legend import title_and_legend
+from fgbaseline.reports.figures.layout import title_and_legend
 from fgbaseline.reports.figures.run import draw_for_paper
 from fgbaseline.reports.figures.run_data import of_folder
 from fgbaseline.reports.figures.style import PAPER, SCREEN, in_style, label

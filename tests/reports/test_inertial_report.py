@@ -20,7 +20,7 @@ from fgbaseline.geometry import InputError
 from fgbaseline.geometry.strapdown import BLOCKS
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
 from fgbaseline.reports.accuracy_check.limits import read_limits
-from fgbaseline.reports.figures.evidence import velocity_and_biases
+from fgbaseline.reports.figures.over_time import velocity_and_biases
 from fgbaseline.reports.figures.run import figure_functions
 from fgbaseline.reports.figures.run_data import of_run
 from fgbaseline.reports.figures.style import in_style

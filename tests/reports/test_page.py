@@ -17,7 +17,7 @@ import pytest
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.data import Event, Excluded, Observations, Status
 from fgbaseline.reports import figures
-from fgbaseline.reports.figures.palette import ESTIMATOR_COLORS, EXTRA_COLORS, REFERENCE, TRUTH, on_dark
+from fgbaseline.reports.figures.style import ESTIMATOR_COLORS, EXTRA_COLORS, REFERENCE, TRUTH, on_dark
 from fgbaseline.reports.formatting import number
 from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.html.run_page import render

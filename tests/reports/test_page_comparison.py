@@ -16,8 +16,8 @@ from fgbaseline.geometry import FloatArray, se3
 from fgbaseline.reports.cli import main
 from fgbaseline.reports.comparison import ComparisonReport, compare
 from fgbaseline.reports.figures.comparison_data import of_comparison
-from fgbaseline.reports.html import comparison_page, diagnosis_page, run_page
-from fgbaseline.reports.html.comparison_plots import GAP, MOMENTS, comparison_plots
+from fgbaseline.reports.html import comparison_page, run_page
+from fgbaseline.reports.html.comparison_page import GAP, MOMENTS, comparison_plots
 from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.results.diagnosis import found_by
 from fgbaseline.reports.results.provenance import LIBRARIES, creation
@@ -195,7 +195,7 @@ def test_every_page_ends_with_date_command_line_versions_and_processor(
     pages = {
         "run": page_of_run,
         "comparison": lambda: page_of(six()),
-        "diagnosis": lambda: diagnosis_page.render(found_by(diagnose(drive(seconds=4.0))), {}),
+        "diagnosis": lambda: run_page.render_diagnosis(found_by(diagnose(drive(seconds=4.0))), {}),
     }
     page = pages[kind]()
     record = records(page)

@@ -13,7 +13,7 @@ from PIL import Image
 
 from fgbaseline.diagnosis import diagnose
 from fgbaseline.reports import figures
-from fgbaseline.reports.figures.palette import (
+from fgbaseline.reports.figures.style import (
     DARK_GROUND,
     DASHES,
     ESTIMATOR_COLORS,
@@ -23,10 +23,10 @@ from fgbaseline.reports.figures.palette import (
     colors,
     on_dark,
 )
-from fgbaseline.reports.html import comparison_page, diagnosis_page
+from fgbaseline.reports.html import comparison_page
+from fgbaseline.reports.html.page import policy
 from fgbaseline.reports.html.plot_encoding import embedded_json, floats
-from fgbaseline.reports.html.rendering import policy
-from fgbaseline.reports.html.run_page import render
+from fgbaseline.reports.html.run_page import render, render_diagnosis
 from fgbaseline.reports.results.diagnosis import found_by
 
 from ..builders.browser import Opened
@@ -431,7 +431,7 @@ def pages(page: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, tup
     drawn = figures.draw_diagnosis(found.diagnosis, found.tracks)
     texts = {
         "comparison": comparison_page.render(comparison, comparison.summary, comparison.figures()),
-        "diagnosis": diagnosis_page.render(found, drawn),
+        "diagnosis": render_diagnosis(found, drawn),
     }
     for name, text in texts.items():
         (folder / f"{name}.html").write_text(text, encoding="utf-8")

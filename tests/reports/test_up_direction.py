@@ -11,7 +11,7 @@ from fgbaseline.data.formats.trajectory_reader import read_trajectory_file
 from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.comparison import ComparisonReport, compare
 from fgbaseline.reports.figures.comparison_data import of_comparison
-from fgbaseline.reports.html.comparison_plots import comparison_plots
+from fgbaseline.reports.html.comparison_page import comparison_plots
 from fgbaseline.reports.run.folder import write_numbers
 
 from ..builders.runs import standard_run

@@ -80,17 +80,10 @@ class TimeChart {
 
   // Over what is drawn in the span, and the band where there is one.
   range(lines, [first, last]) {
-    let low = Infinity;
-    let high = -Infinity;
-    const take = value => {
-      if (!Number.isFinite(value) || (this.log && value <= 0)) return;
-      low = Math.min(low, value);
-      high = Math.max(high, value);
-    };
-    lines.forEach(({ points }) => points.forEach(([, value]) => take(value)));
-    this.narrowest(first, last).forEach(take);
-    if (this.chart.band) this.chart.band.forEach(take);
-    if (this.chart.middle !== null) take(this.chart.middle);
+    const { band, middle } = this.chart;
+    const drawn = lines.flatMap(({ points }) => points.map(([, value]) => value));
+    const values = [...drawn, ...this.narrowest(first, last), ...(band || []), ...(middle === null ? [] : [middle])];
+    let [low, high] = extremes(this.log ? values.filter(value => value > 0) : values);
     if (low > high) return this.log ? [0.1, 10] : [0, 1];
     if (this.log) {
       low = Math.max(low, high * 1e-6, RESOLUTIONS[this.chart.unit] || 0);
@@ -104,14 +97,8 @@ class TimeChart {
   // Ends of the band around a line that reaches least far, which is to be seen as a whole; the others may be cut off.
   narrowest(first, last) {
     const ends = this.shown().filter(([key]) => this.chart.bounds.has(key)).map(([key, line]) => {
-      const bound = this.chart.bounds.get(key);
-      let [low, high] = [Infinity, -Infinity];
-      for (let k = first; k <= last; k++) {
-        if (!Number.isFinite(line[k] + bound[k])) continue;
-        low = Math.min(low, line[k] - bound[k]);
-        high = Math.max(high, line[k] + bound[k]);
-      }
-      return [low, high];
+      const [part, bound] = [line, this.chart.bounds.get(key)].map(of => of.subarray(first, last + 1));
+      return extremes([-1, 1].flatMap(sign => Array.from(part, (value, k) => value + sign * bound[k])));
     }).filter(([low, high]) => low <= high);
     return ends.sort((a, b) => a[1] - a[0] - b[1] + b[0])[0] || [];
   }

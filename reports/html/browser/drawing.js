@@ -53,6 +53,17 @@ function median(values) {
   return known.length % 2 ? known[half] : (known[half - 1] + known[half]) / 2;
 }
 
+// Smallest and largest of those values that are finite; [Infinity, -Infinity] without any.
+function extremes(values) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const value of values) {
+    if (!Number.isFinite(value)) continue;
+    low = Math.min(low, value);
+    high = Math.max(high, value);
+  }
+  return [low, high];
+}
+
 // Medians of a line over the frames around every `half`-th frame between two ends, which are among them: [frame, value].
 function runningMedian(line, [first, last], half) {
   const frames = Array.from({ length: Math.floor((last - first) / half) + 1 }, (_, i) => first + i * half);

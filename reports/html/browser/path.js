@@ -14,6 +14,7 @@ const times = (P, a, b) => P[0] * a[0] * b[0] + P[3] * a[1] * b[1] + P[5] * a[2]
 class PathView {
   constructor(place) {
     this.place = place.querySelector(".plot");
+    this.followButton = place.querySelector('[data-do="follow"]');
     this.svg = svg("svg", { tabindex: "0", role: "application", "aria-label": place.dataset.label });
     this.place.append(this.svg);
     Object.assign(this, { solid: false, landmarks: false, ellipses: false, band: false, follow: false, factor: 1 });
@@ -40,21 +41,15 @@ class PathView {
 
   // The box of the paths; a path that runs off alone may be switched off, but does not hide the others.
   bounds() {
-    const reach = [...trajectories.values()].map(trajectory => {
-      const box = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
-      trajectory.path.forEach((value, i) => {
-        if (!Number.isFinite(value)) return;
-        box[i % 3] = Math.min(box[i % 3], value);
-        box[3 + i % 3] = Math.max(box[3 + i % 3], value);
-      });
-      return box;
-    }).filter(box => box[0] <= box[3]);
-    const size = box => Math.hypot(box[3] - box[0], box[4] - box[1], box[5] - box[2]);
-    const sizes = reach.map(size).sort((a, b) => a - b);
+    const boxes = [...trajectories.values()]
+      .map(({ path }) => [0, 1, 2].map(axis => extremes(path.filter((_, i) => i % 3 === axis))))
+      .filter(([[low, high]]) => low <= high);
+    const size = box => Math.hypot(...box.map(([low, high]) => high - low));
+    const sizes = boxes.map(size).sort((a, b) => a - b);
     const typical = sizes[Math.floor((sizes.length - 1) / 2)] || 1;
-    const kept = reach.filter(box => size(box) <= 10 * typical);
-    const low = [0, 1, 2].map(i => Math.min(...kept.map(box => box[i])));
-    const high = [0, 1, 2].map(i => Math.max(...kept.map(box => box[3 + i])));
+    const kept = boxes.filter(box => size(box) <= 10 * typical);
+    const low = [0, 1, 2].map(i => Math.min(...kept.map(box => box[i][0])));
+    const high = [0, 1, 2].map(i => Math.max(...kept.map(box => box[i][1])));
     return kept.length ? { low, high } : { low: [-1, -1, -1], high: [1, 1, 1] };
   }
 
@@ -123,7 +118,7 @@ class PathView {
       }
     }
     for (const { key, path, place } of this.lines) {
-      const last = this.lastPose(path);
+      const last = Math.floor(path.findLastIndex(Number.isFinite) / 3);
       if (last < 0) continue;
       const [x, y] = place(last);
       parts.push(svg("rect", { class: "end estimator-" + key, x: x - 3.5, y: y - 3.5, width: 7, height: 7 }));
@@ -144,11 +139,6 @@ class PathView {
 
   shown() {
     return [...trajectories.values()].filter(trajectory => chosen.shown.has(trajectory.key));
-  }
-
-  lastPose(path) {
-    for (let k = run.frames - 1; k >= 0; k--) if (Number.isFinite(path[3 * k])) return k;
-    return -1;
   }
 
   dots(points) {
@@ -203,13 +193,13 @@ class PathView {
   ruler() {
     const wanted = 0.25 * this.width / this.scale;
     const power = 10 ** Math.floor(Math.log10(wanted));
-    const metres = power * [5, 2, 1].find(factor => factor * power <= wanted);
-    const length = metres * this.scale;
+    const meters = power * [5, 2, 1].find(factor => factor * power <= wanted);
+    const length = meters * this.scale;
     const y = this.height - 10;
-    const offset = this.factor === 1 ? "" : `; ${quantity(metres / this.factor, "m")} of offset from ${this.reference.name} (× ${this.factor})`;
+    const offset = this.factor === 1 ? "" : `; ${quantity(meters / this.factor, "m")} of offset from ${this.reference.name} (× ${this.factor})`;
     return [
       svg("path", { class: "ruler", d: `M12 ${y - 5}v5h${length.toFixed(1)}v-5` }),
-      svg("text", { class: "tick", x: 18 + length, y: y + 1 }, `${Number(metres.toPrecision(3))} m${offset}`),
+      svg("text", { class: "tick", x: 18 + length, y: y + 1 }, `${Number(meters.toPrecision(3))} m${offset}`),
     ];
   }
 
@@ -241,6 +231,7 @@ class PathView {
     this.cursor.replaceChildren(...parts);
   }
 
+  // Turns the picture in 3D, else moves it; it then no longer follows the cursor.
   drag(dx, dy) {
     if (this.solid) {
       this.turn -= 0.008 * dx;
@@ -261,5 +252,6 @@ class PathView {
     const moved = (this.here() || this.center).map((value, i) => value - this.center[i]);
     this.pan = [this.pan[0] - this.scale * dot(this.right, moved), this.pan[1] + this.scale * dot(this.up, moved)];
     this.follow = false;
+    press(this.followButton, false);
   }
 }

@@ -3,7 +3,6 @@ class PathControls {
   constructor(view, place) {
     this.view = view;
     this.words = place.querySelector(".view");
-    this.followButton = place.querySelector('[data-do="follow"]');
     this.listen();
     this.buttons(place);
   }
@@ -59,7 +58,7 @@ class PathControls {
       moved = true;
       from = [event.clientX, event.clientY];
       hideHint();
-      return this.change(() => this.drag(dx, dy));
+      return this.change(() => this.view.drag(dx, dy));
     });
     const end = () => { from = null; };
     svg.addEventListener("pointerup", end);
@@ -75,10 +74,10 @@ class PathControls {
       this.change(() => this.view.magnify(Math.exp(-0.0015 * event.deltaY)));
     }, { passive: false });
     const keys = {
-      ArrowLeft: () => this.drag(-30, 0),
-      ArrowRight: () => this.drag(30, 0),
-      ArrowUp: () => this.drag(0, -30),
-      ArrowDown: () => this.drag(0, 30),
+      ArrowLeft: () => this.view.drag(-30, 0),
+      ArrowRight: () => this.view.drag(30, 0),
+      ArrowUp: () => this.view.drag(0, -30),
+      ArrowDown: () => this.view.drag(0, 30),
       "+": () => this.view.magnify(1.3),
       "=": () => this.view.magnify(1.3),
       "-": () => this.view.magnify(1 / 1.3),
@@ -89,12 +88,6 @@ class PathControls {
       this.change(keys[event.key]);
       event.preventDefault();
     });
-  }
-
-  // Turns the picture in 3D, else moves it; it then stays where it is, and no longer follows the cursor.
-  drag(dx, dy) {
-    if (!this.view.solid && this.view.follow) press(this.followButton, false);
-    this.view.drag(dx, dy);
   }
 
   buttons(place) {

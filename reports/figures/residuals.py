@@ -1,4 +1,4 @@
-"""Reprojection errors: over time with the observations, as a distribution, by classes, and by track."""
+"""Residuals: reprojection errors over time, by class and by track, held-out errors, and distances of landmarks."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -7,18 +7,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from fgbaseline import compare
 from fgbaseline.data import Excluded, Problem
 from fgbaseline.data.problem import WRONG_MATCH
+from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 
-from .legend import swatch, title_and_legend
-from .over_time import Panel, time_axis, time_panels
-from .palette import GRAY, GREEN
-from .panels import fit_log, log_where_positive, plot_series, running_median, short, smoothed
+from ..formatting import RESOLUTION
+from .comparison_data import ComparisonData
+from .layout import title_and_legend
+from .over_time import Panel, time_panels
+from .panels import fit_log, intervals, log_where_positive, plot_series, running_median, smoothed, swatch, time_axis
 from .run_data import RunData
-from .style import SCREEN, Line, Style, label, stacked_panels
+from .style import GRAY, GREEN, SCREEN, Line, Style, label, safe_text, stacked_panels
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,7 +66,7 @@ def reprojection_over_time(run: RunData, style: Style = SCREEN) -> Figure | None
     colors = [BANDS[name][0] for name in counts]
     lower.stackplot(run.t, *counts.values(), colors=colors, linewidth=0, step="post", rasterized=True)
     lower.set(ylabel="observations per frame", ylim=(0, None))
-    time_axis(run, [upper, lower])
+    time_axis([upper, lower], run.t)
     bands = [swatch(BANDS[name][0], name) for name in counts if counts[name].any()]
     title_and_legend(figure, "Median reprojection error by frame, and the observations", [*handles, *bands])
     return figure
@@ -165,11 +168,13 @@ def _ninths(classes: "pd.DataFrame") -> FloatArray:
     from fgbaseline.compare.residuals.residual_classes import REGION, REGION_COLUMNS, REGION_ROWS
 
     medians = classes.loc[classes["by"] == REGION].set_index("of")["median"]
-    return (
-        medians.reindex([f"{row} {column}" for row in REGION_ROWS for column in REGION_COLUMNS])
-        .to_numpy(np.float64)
-        .reshape(3, 3)
-    )
+    ninths = [f"{row} {column}" for row in REGION_ROWS for column in REGION_COLUMNS]
+    return medians.reindex(ninths).to_numpy(np.float64).reshape(3, 3)
+
+
+def short(text: str) -> str:
+    """Name of a class as a tick has room for it: `5 to 10 m` is 5–10 m."""
+    return text.replace(" and more", "+").replace(" to ", "–")
 
 
 def medians_by_class(
@@ -238,3 +243,70 @@ def _mark_small_error(axes: Axes, *, vertical: bool) -> None:
     else:
         axes.axhline(SMALL_ERROR, **style)
         axes.text(1.003, SMALL_ERROR, "3 px", transform=axes.get_yaxis_transform(), va="center", **letters)
+
+
+def map_difference(data: RunData | ComparisonData, style: Style = SCREEN) -> Figure | None:
+    """Median distance of landmarks from the reference's by depth; None where none is shared.
+
+    In meters and sigmas, on paper only in the camera frame. Another solver of the reference's graph has no distance in
+    sigmas: P - P_ref is zero up to rounding.
+    """
+    from fgbaseline.compare.estimate_comparison import SAME_GRAPH
+
+    tables = {
+        name: table.assign(sigmas=np.nan) if {name, data.reference} <= set(SAME_GRAPH) else table
+        for name, table in data.by_depth.items()
+    }
+    columns = {"distance": "in the world, m", "seen": "in the camera frame, m", "sigmas": "in the world, sigmas"}
+    if not style.titled:
+        columns = {"seen": ""}
+    shown = {c: title for c, title in columns.items() if any(t[c].notna().any() for t in tables.values())}
+    if not shown:
+        return None
+    line = data.line(style, max(map(len, tables.values())))
+    figure = Figure(figsize=(style.width, 3.4 if style.titled else 1.7))
+    panels = figure.subplots(1, len(shown), squeeze=False)[0]
+    handles = []
+    for panel, (column, title) in zip(panels, shown.items(), strict=True):
+        medians = {name: table[column] for name, table in tables.items()}
+        handles += medians_by_class(panel, medians, line, style, _depth)
+        log_where_positive(panel)
+        if column != "sigmas" and panel.get_yscale() == "log" and panel.get_ylim()[1] > RESOLUTION:
+            panel.set_ylim(bottom=max(RESOLUTION, panel.get_ylim()[0]))
+        panel.set(title=title, xlabel="depth, m")
+    if not style.titled:
+        panels[0].set_ylabel("distance, m")
+    title = f"Landmarks: median distance from those of {safe_text(data.reference or '')}, by depth"
+    title_and_legend(figure, title, handles, style)
+    return figure
+
+
+def _depth(name: str) -> str:
+    return short(name.replace(" m and more", "+")).removesuffix(" m")
+
+
+def held_out(run: RunData, style: Style = SCREEN) -> Figure | None:
+    """Median error of each path on held-out tracks, with its 95 % interval, best on top; None without any."""
+    table = run.held_out
+    if table is None:
+        return None
+    n, colors = len(table), run.colors
+    figure = Figure(figsize=(style.width, 1.5 + 0.36 * n if style.titled else 0.6 + 0.2 * n))
+    panel = figure.subplots()
+    names = [str(name) for name in table["estimator"]]
+    low, median, high = (table[column].to_numpy(dtype=np.float64) for column in ("low", "median", "high"))
+    rows = zip(range(n), low, median, high, [colors[name] for name in names], strict=True)
+    intervals(panel, rows, *((6.0, 2.2) if style.titled else (3.5, 1.6)))
+    panel.set_yticks(range(n), [safe_text(name) for name in names])
+    panel.set_ylim(n - 0.4, -0.6)
+    if style.titled and 0.0 < float(median.min()) < 0.2 * float(median.max()) < np.inf:
+        panel.set_xscale("log")
+        panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        panel.xaxis.set_major_formatter("{x:g}")
+        panel.xaxis.set_minor_formatter(NullFormatter())
+    panel.set_xlabel("median held-out error, px" + (", with its 95 % interval" if style.titled else ""))
+    held = None if run.run is None else run.run.held_out
+    pieces = 0 if held is None or held.errors is None else held.errors.inliers
+    title = f"Held-out error: {plural(pieces, 'piece')} of tracks that no estimator used"
+    title_and_legend(figure, title, style=style)
+    return figure
