@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from fgbaseline.compare import distance_traveled
 from fgbaseline.data import Status
 from fgbaseline.data.top_view import TopView
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
+from fgbaseline.geometry.path_length import path_length
 
 from ..formatting import meters
 from .drawing import DrawOne, drawn
@@ -183,7 +183,7 @@ def _map(axes: Axes, study: "Study", outcomes: Several["Outcome"]) -> None:
     broken = []
     for o in outcomes:
         x, y = features.index(o.settings.features or 0), noises.index(o.settings.pixel_variance)
-        share = o.apart_rmse / float(distance_traveled(study.predicted[:, :3, 3])[-1])
+        share = o.apart_rmse / path_length(study.predicted[:, :3, 3])
         level = 1.0 if not np.isfinite(share) else float(np.log(max(share, 1e-9) / LEAST) / np.log(MOST / LEAST))
         color = COLORS(np.clip(level, 0.0, 1.0))
         axes.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=color, edgecolor="white", linewidth=0.6))

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, RmseDifference, distance_traveled, is_level
+from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, RmseDifference, is_level
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.sample_sizes import coverage
 from fgbaseline.data.wording import capitalized, plural
+from fgbaseline.geometry.path_length import path_length
 
 from ..formatting import (
     MINUS,
@@ -251,8 +252,8 @@ def path_lengths(comparison: Comparison) -> list[str]:
     each = []
     for result in comparison.results.values():
         matched = result.matched
-        own = float(distance_traveled(matched.estimate.position)[-1]) / float(matched.alignment.scale)
-        path = float(distance_traveled(matched.reference.position)[-1])
+        own = path_length(matched.estimate.position) / float(matched.alignment.scale)
+        path = path_length(matched.reference.position)
         if path > 0.0 and number(own) != number(path):
             share = f"{per_cent(abs(own / path - 1.0))} {'longer' if own > path else 'shorter'}"
             each.append(f"{result.name} {number(own)} m, {share}")

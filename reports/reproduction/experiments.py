@@ -12,6 +12,7 @@ from fgbaseline.data.problem.documented import DEFAULT_FEATURES, SLAM_PIXEL_VARI
 from fgbaseline.data.velocity_increments import dead_reckoned_path, increments
 from fgbaseline.diagnosis import Diagnosis, diagnose
 from fgbaseline.geometry import FloatArray, se3
+from fgbaseline.geometry.path_length import path_length
 
 from .recordings import MAPPED, Stage, Subject, diagnosed_stages, simulated_stages
 
@@ -128,7 +129,7 @@ class Study:
     @property
     def road(self) -> float:
         """Length of the dead-reckoned path, m."""
-        return float(compare.distance_traveled(self.predicted[:, :3, 3])[-1])
+        return path_length(self.predicted[:, :3, 3])
 
     @property
     def recorded(self) -> Outcome:
