@@ -25,7 +25,7 @@ from rich.table import Table
 
 from fgbaseline import compare, data, diagnosis
 from fgbaseline.data import Estimate, Problem, Sequence, Status, estimator_names
-from fgbaseline.data.estimator_runner import solve_all
+from fgbaseline.data.estimators.runner import solve_all
 from fgbaseline.diagnosis import AsRecordedSettings
 
 RECORDINGS = Path(os.environ.get("FGBASELINE_RECORDINGS", Path(__file__).parents[2] / "shared" / "data"))

@@ -57,7 +57,7 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
         sequence = read_sequence(settings)
     with watch(POSING), background_map(lambda _: build_problem(sequence, settings, cores()), 1, cores()) as posed:
         from fgbaseline.compare.estimate_comparison import compare_all
-        from fgbaseline.data.estimator_runner import solve_all
+        from fgbaseline.data.estimators.runner import solve_all
         from fgbaseline.reports import figures
         from fgbaseline.reports.run.folder import write_numbers, write_page
 

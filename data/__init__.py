@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fgbaseline.geometry import HuberKernel
 
-    from .estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
+    from .estimators.estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
+    from .estimators.registry import estimator_names, estimator_summaries, find_estimator
     from .finding import Finding
     from .formats import (
         attach_truth,
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from .problem import Excluded, LandmarkMode, LandmarkPrior, Problem
     from .problem.documented import documented
     from .problem_export import read_problem, write_problem
-    from .registry import estimator_names, estimator_summaries, find_estimator
     from .sequence import Sequence, Truth
     from .time_unit import TimeUnit
     from .trajectory import Trajectory
@@ -36,7 +36,7 @@ else:
         __name__,
         {
             "fgbaseline.geometry": "HuberKernel",
-            "estimate": "Estimate Event EventKind Innovations Landmarks Progress Status",
+            "estimators.estimate": "Estimate Event EventKind Innovations Landmarks Progress Status",
             "finding": "Finding",
             "formats": "attach_truth read read_kitti read_times read_trajectory read_tum write_euroc write_kitti "
             "write_npz write_trajectory_npz write_tum",
@@ -45,7 +45,7 @@ else:
             "problem": "Excluded LandmarkMode LandmarkPrior Problem",
             "problem.documented": "documented",
             "problem_export": "read_problem write_problem",
-            "registry": "estimator_names estimator_summaries find_estimator",
+            "estimators.registry": "estimator_names estimator_summaries find_estimator",
             "sequence": "Sequence Truth",
             "time_unit": "TimeUnit",
             "trajectory": "Trajectory",

@@ -5,7 +5,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
-from .estimate import Landmarks
+from .estimators.estimate import Landmarks
 from .problem import Problem
 
 SINGULAR_CONDITION = 1e14

@@ -5,7 +5,7 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
+from fgbaseline.data.estimators.estimate import Estimate, Event, EventKind, Innovations, Landmarks, Progress, Status
 from fgbaseline.data.problem import LandmarkMode, Problem
 from fgbaseline.geometry import FloatArray, se3
 

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from fgbaseline.data.estimate import Estimate, Landmarks, Progress
+from fgbaseline.data.estimators.estimate import Estimate, Landmarks, Progress
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 

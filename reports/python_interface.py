@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Protocol, TypeVar, get_args, get_origin
 
 from fgbaseline.data.display import LINES, cut
-from fgbaseline.data.formats.atomic_folder import atomic_folder
-from fgbaseline.data.formats.atomic_write import atomic_write
-from fgbaseline.data.formats.file_errors import FilePath
+from fgbaseline.data.formats.files.atomic_folder import atomic_folder
+from fgbaseline.data.formats.files.atomic_write import atomic_write
+from fgbaseline.data.formats.files.file_errors import FilePath
 from fgbaseline.geometry import InputError
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 import gtsam
 
-from fgbaseline.data.estimate import Event, EventKind
+from fgbaseline.data.estimators.estimate import Event, EventKind
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 

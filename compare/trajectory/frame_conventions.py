@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fgbaseline.data.formats.quaternion_order import CLEARLY, NOTICED, STEP, fits_clearly_better
+from fgbaseline.data.formats.trajectories.quaternion_order import CLEARLY, NOTICED, STEP, fits_clearly_better
 from fgbaseline.geometry import FloatArray, se3, so3
 
 from ..statistics.descriptive import rms_norm

@@ -9,7 +9,7 @@ from fgbaseline.compare.trajectory_comparison.conventions import paired
 from fgbaseline.compare.trajectory_comparison.inputs import Entry
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Trajectory
-from fgbaseline.data.formats.quaternion_order import fits_clearly_better
+from fgbaseline.data.formats.trajectories.quaternion_order import fits_clearly_better
 from fgbaseline.geometry import FloatArray, InputError
 
 LEAST_MISFIT = 1e-3

@@ -10,9 +10,9 @@ from fgbaseline.compare import MatchedTrajectories
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Landmarks, TimeUnit, Trajectory
 from fgbaseline.data.formats import Order, ParsedTrajectory
-from fgbaseline.data.formats.common_time_unit import Spans, units_in_common
-from fgbaseline.data.formats.parsed_trajectory import bends, unit_ambiguity
-from fgbaseline.data.formats.quaternion_order import fits_clearly_better, in_words
+from fgbaseline.data.formats.stamps.common_time_unit import Spans, units_in_common
+from fgbaseline.data.formats.trajectories.parsed_trajectory import bends, unit_ambiguity
+from fgbaseline.data.formats.trajectories.quaternion_order import fits_clearly_better, in_words
 from fgbaseline.geometry import FloatArray, InputError, so3
 
 Source = ParsedTrajectory | Trajectory

@@ -11,7 +11,7 @@ from fgbaseline.compare import Alignment, MatchedTrajectories
 from fgbaseline.compare.trajectory_comparison.inputs import Entry
 from fgbaseline.data import Estimate, Excluded, HeldOut, Landmarks, Problem, Trajectory
 from fgbaseline.data.display import Displayed
-from fgbaseline.data.formats.ground_truth import match_stamps
+from fgbaseline.data.formats.recordings.ground_truth import match_stamps
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.triangulate_landmarks import landmarks_along
 from fgbaseline.geometry import FloatArray, InputError, se3

@@ -3,36 +3,36 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .euroc import read_euroc, write_euroc
-    from .ground_truth import BodyFrame, attach_truth
-    from .kitti import read_kitti, read_times, write_kitti
-    from .landmark_file import read_landmarks
-    from .npz_writer import write_npz
-    from .parsed_trajectory import ParsedTrajectory
-    from .recording import read
-    from .trajectory_columns import Order
-    from .trajectory_npz import write_trajectory_npz
-    from .trajectory_opening import TrajectoryFormat
-    from .trajectory_reader import read_pose_covariances, read_trajectory, read_trajectory_file
-    from .tum import read_tum, write_tum
+    from .recordings.ground_truth import BodyFrame, attach_truth
+    from .recordings.landmark_file import read_landmarks
+    from .recordings.npz_writer import write_npz
+    from .recordings.reader import read
+    from .trajectories.columns import Order
+    from .trajectories.euroc import read_euroc, write_euroc
+    from .trajectories.kitti import read_kitti, read_times, write_kitti
+    from .trajectories.npz import write_trajectory_npz
+    from .trajectories.opening import TrajectoryFormat
+    from .trajectories.parsed_trajectory import ParsedTrajectory
+    from .trajectories.reader import read_pose_covariances, read_trajectory, read_trajectory_file
+    from .trajectories.tum import read_tum, write_tum
 else:
     from fgbaseline.geometry.lazy_names import lazy_names
 
     __getattr__ = lazy_names(
         __name__,
         {
-            "trajectory_columns": "Order",
-            "euroc": "read_euroc write_euroc",
-            "tum": "read_tum write_tum",
-            "ground_truth": "BodyFrame attach_truth",
-            "kitti": "read_kitti read_times write_kitti",
-            "landmark_file": "read_landmarks",
-            "npz_writer": "write_npz",
-            "parsed_trajectory": "ParsedTrajectory",
-            "recording": "read",
-            "trajectory_npz": "write_trajectory_npz",
-            "trajectory_opening": "TrajectoryFormat",
-            "trajectory_reader": "read_pose_covariances read_trajectory read_trajectory_file",
+            "trajectories.columns": "Order",
+            "trajectories.euroc": "read_euroc write_euroc",
+            "trajectories.tum": "read_tum write_tum",
+            "recordings.ground_truth": "BodyFrame attach_truth",
+            "trajectories.kitti": "read_kitti read_times write_kitti",
+            "recordings.landmark_file": "read_landmarks",
+            "recordings.npz_writer": "write_npz",
+            "trajectories.parsed_trajectory": "ParsedTrajectory",
+            "recordings.reader": "read",
+            "trajectories.npz": "write_trajectory_npz",
+            "trajectories.opening": "TrajectoryFormat",
+            "trajectories.reader": "read_pose_covariances read_trajectory read_trajectory_file",
         },
     )
 

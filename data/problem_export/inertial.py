@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from ..formats.field_checks import positive
+from ..formats.files.field_checks import positive
 from ..imu import ImuNoise, ImuSamples
 from ..problem import InverseDepthPrior, Problem
 from ..problem.inertial import ImuIntervals, InertialStart, imu_intervals

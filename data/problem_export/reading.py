@@ -8,9 +8,9 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, HuberKernel, InputError, MonocularCamera, StereoCamera
 
-from ..formats.field_checks import extrinsic, positive, time_stamps
-from ..formats.file_errors import FilePath, reading, regular_file
-from ..formats.npz_archive import NpzArchive
+from ..formats.files.field_checks import extrinsic, positive, time_stamps
+from ..formats.files.file_errors import FilePath, reading, regular_file
+from ..formats.files.npz_archive import NpzArchive
 from ..observations import IntArray, Observations
 from ..problem import Excluded, LandmarkMode, LandmarkPrior, Problem
 from ..sequence import Sequence

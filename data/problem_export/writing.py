@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from fgbaseline.geometry import StereoCamera
 
-from ..formats.atomic_write import atomic_write
-from ..formats.npz_member import write_member
+from ..formats.files.atomic_write import atomic_write
+from ..formats.files.npz_member import write_member
 from ..problem import Excluded, Problem
 from . import layout
 from .inertial import inertial_arrays, inertial_scalars

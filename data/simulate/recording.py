@@ -14,15 +14,15 @@ from ..wording import per_cent
 from .camera_view import CameraView
 from .inertial import recorded_samples, standing_start
 from .match_errors import displaced, noisy_pixels, wrong_matches
-from .moving_objects import MovingObjects
 from .random_streams import RandomStream, generator
 from .roads import drive, highway_road, loop_road, town_road
-from .room import Room
 from .settings import MAX_FRAMES, Simulation
 from .simulated_path import Path, drone_path, followed, handheld_path, path_along, time_grid
-from .street import Street
 from .tracks import Tracking, Tracks, follow
 from .velocities import recorded_velocities
+from .worlds.moving_objects import MovingObjects
+from .worlds.room import Room
+from .worlds.street import Street
 
 
 @dataclass(frozen=True, eq=False, slots=True)

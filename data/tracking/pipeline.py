@@ -7,11 +7,11 @@ import numpy as np
 
 from fgbaseline.geometry import Camera, FloatArray, InputError, MonocularCamera, se3
 
-from ..estimate import Progress
-from ..formats.ground_truth import attach_truth
-from ..formats.imu_attachment import attach_imu
-from ..formats.inertial_ground_truth import inertial_truth
-from ..formats.npz_writer import write_npz, write_tracks
+from ..estimators.estimate import Progress
+from ..formats.inertial.ground_truth import inertial_truth
+from ..formats.inertial.imu_attachment import attach_imu
+from ..formats.recordings.ground_truth import attach_truth
+from ..formats.recordings.npz_writer import write_npz, write_tracks
 from ..observations import BoolArray, Observations
 from ..sequence import Sequence, Truth
 from ..wording import plural

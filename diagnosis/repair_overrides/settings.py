@@ -6,9 +6,9 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationInfo, field_validator
 
 from fgbaseline.data.axis_conventions import AXIS_CONVENTIONS, IDENTITY
-from fgbaseline.data.formats.file_errors import FilePath
+from fgbaseline.data.formats.files.file_errors import FilePath
+from fgbaseline.data.formats.files.toml_file import is_finite_number, read_toml
 from fgbaseline.data.time_unit import TimeUnit
-from fgbaseline.data.toml_file import is_finite_number, read_toml
 
 AS_RECORDED = "as-recorded"
 """keyword that disables a repair"""

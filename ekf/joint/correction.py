@@ -5,9 +5,9 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, se3, so3
 
 from ..motion_model import POSE
+from .one_camera.unknown_depths import UnknownDepths
 from .settings import Linearization
 from .state import JointState
-from .unknown_depths import UnknownDepths
 from .unobservable_directions import transform_columns
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, EventKind, GyroBias, Progress, Status
+from fgbaseline.data.estimators.estimate import Estimate, Event, EventKind, GyroBias, Progress, Status
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FgbaselineError
 

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from fgbaseline.data.estimate import Event, EventKind, Innovations
+from fgbaseline.data.estimators.estimate import Event, EventKind, Innovations
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
@@ -14,16 +14,16 @@ from .correction import correct
 from .feature_selection import select_features
 from .gating import GatedObservations, gate_observations
 from .gyro_bias import BiasedVelocityMotion
-from .inverse_depth_prior import common_change
 from .landmark_initialization import new_landmarks
 from .landmark_map import LandmarkMap
 from .landmark_representation import LandmarkRepresentation
 from .linearized_observations import LinearizedObservations, linearize
+from .one_camera.inverse_depth_prior import common_change
+from .one_camera.second_order import second_order, second_order_of
+from .one_camera.unknown_depths import MIN_COSINE, UnknownDepths, observed_depths
 from .process_noise import MAX_REJECTED, ProcessNoise
-from .second_order import second_order, second_order_of
 from .settings import JointSettings, Linearization
 from .state import ABSENT, JointState
-from .unknown_depths import MIN_COSINE, UnknownDepths, observed_depths
 from .unobservable_directions import first_estimate_transition
 from .update import CholeskyFactor, Innovation, NotPositiveDefiniteError, kalman_update
 

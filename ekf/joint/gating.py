@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from scipy.special import chdtri
 
-from fgbaseline.data.estimate import EventKind
+from fgbaseline.data.estimators.estimate import EventKind
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray, MeasurementModel
 

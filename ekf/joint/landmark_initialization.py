@@ -9,8 +9,8 @@ from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.linearization import predict
 from fgbaseline.geometry.measurement_model import back_projected
 
-from .inverse_depth_prior import inverse_depths, scene_depth
 from .landmark_representation import chart, coordinates_of
+from .one_camera.inverse_depth_prior import inverse_depths, scene_depth
 from .settings import JointSettings, Linearization
 from .state import CommonError, JointState
 

@@ -6,7 +6,7 @@ initialized as a new landmark, because the pose already contains the information
 
 import numpy as np
 
-from fgbaseline.data.estimate import Event, EventKind, Landmarks
+from fgbaseline.data.estimators.estimate import Event, EventKind, Landmarks
 from fgbaseline.data.observations import BoolArray, IntArray
 
 from .landmark_representation import WorldPoints

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fgbaseline.data.estimate import EventKind
+from fgbaseline.data.estimators.estimate import EventKind
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.measurement_model import mahalanobis_squared
 

@@ -21,7 +21,7 @@ from fgbaseline.compare.trajectory_comparison.conventions import Resolved, resol
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Estimate, Status, Trajectory, Truth
 from fgbaseline.data.formats import Order
-from fgbaseline.data.formats.file_errors import FilePath
+from fgbaseline.data.formats.files.file_errors import FilePath
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..comparison.sources import opened

@@ -17,9 +17,9 @@ import click
 from rich.console import Console
 
 from fgbaseline.compare.acceptance_limits import Outcome
-from fgbaseline.data.formats.atomic_write import atomic_write
-from fgbaseline.data.formats.file_errors import writing
-from fgbaseline.data.toml_file import TomlFile
+from fgbaseline.data.formats.files.atomic_write import atomic_write
+from fgbaseline.data.formats.files.file_errors import writing
+from fgbaseline.data.formats.files.toml_file import TomlFile
 from fgbaseline.geometry import InputError
 
 from ..formatting import md

@@ -7,8 +7,8 @@ from typing import Any
 
 from fgbaseline.compare import MIN_STRETCHES, is_insufficient
 from fgbaseline.compare.acceptance_limits import Bounds, Outcome, around, rounded
-from fgbaseline.data.formats.file_errors import shown
-from fgbaseline.data.toml_file import TomlFile
+from fgbaseline.data.formats.files.file_errors import shown
+from fgbaseline.data.formats.files.toml_file import TomlFile
 
 from ..formatting import number
 from ..phrases.check import too_little_data, untrusted_reference

@@ -12,9 +12,9 @@ from pydantic import AfterValidator, Field, model_validator
 
 from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE
 from fgbaseline.compare.acceptance_limits import Better, Bounds, Outcome, rounded
-from fgbaseline.data.formats.atomic_write import atomic_write
-from fgbaseline.data.formats.file_errors import shown
-from fgbaseline.data.toml_file import TomlFile, read_toml
+from fgbaseline.data.formats.files.atomic_write import atomic_write
+from fgbaseline.data.formats.files.file_errors import shown
+from fgbaseline.data.formats.files.toml_file import TomlFile, read_toml
 from fgbaseline.geometry import InputError
 
 from ..phrases.check import violated_limits

@@ -13,7 +13,7 @@ from rich.live import Live
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.formats.file_errors import shown
+from fgbaseline.data.formats.files.file_errors import shown
 from fgbaseline.data.wording import plural
 
 from ..phrases.bench import duration, sentences

@@ -17,8 +17,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from fgbaseline.data.formats.atomic_write import atomic_write
-from fgbaseline.data.formats.file_errors import shown
+from fgbaseline.data.formats.files.atomic_write import atomic_write
+from fgbaseline.data.formats.files.file_errors import shown
 from fgbaseline.geometry import FloatArray, InputError
 
 from ..figures.bench import draw

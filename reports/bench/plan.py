@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from fgbaseline.data import read
+from fgbaseline.data.formats.files.toml_file import Place, TomlFile, key_path
 from fgbaseline.data.simulate import Simulation
-from fgbaseline.data.toml_file import Place, TomlFile, key_path
 from fgbaseline.diagnosis import read_repairs
 from fgbaseline.geometry import InputError
 

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from fgbaseline.data.formats import BodyFrame
+from fgbaseline.data.formats.files.toml_file import TomlFile, read_toml
 from fgbaseline.data.simulate import Simulation
-from fgbaseline.data.toml_file import TomlFile, read_toml
 from fgbaseline.diagnosis.repair_overrides.settings import SigmaOverrides
 from fgbaseline.geometry import InputError
 

@@ -21,9 +21,9 @@ from threadpoolctl import threadpool_limits
 
 from fgbaseline.compare.estimate_comparison import Run, compare_all
 from fgbaseline.data import LandmarkMode, Problem, Progress, Sequence, documented, read
-from fgbaseline.data.estimator_runner import Watch, describe, solve_all
+from fgbaseline.data.estimators.registry import GROUP
+from fgbaseline.data.estimators.runner import Watch, describe, solve_all
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
-from fgbaseline.data.registry import GROUP
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.diagnosis import AsRecordedSettings, calibrated, hold_out, read_repairs
 from fgbaseline.diagnosis.repair_overrides.settings import Repairs

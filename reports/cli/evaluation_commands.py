@@ -120,7 +120,7 @@ def compare(
 
     Exits 0, or 2 on bad input.
     """
-    from fgbaseline.data.formats.atomic_folder import require_free
+    from fgbaseline.data.formats.files.atomic_folder import require_free
     from fgbaseline.geometry import InputError
 
     from ..comparison import compare as compare_files
@@ -184,7 +184,7 @@ def check(
     undecided when its metric has fewer than 30 poses or covers less than half of the time, when the reference is
     untrusted, or when there is no accuracy baseline to compare with.
     """
-    from fgbaseline.data.toml_text import toml_values
+    from fgbaseline.data.formats.files.toml_text import toml_values
 
     from ..results.json_files import document_in, read_document
 
@@ -214,7 +214,7 @@ def figures(folder: Path, formats: tuple[str, ...], out: Path | None, force: boo
 
     Exits 0, or 2 on bad input.
     """
-    from fgbaseline.data.formats.atomic_folder import atomic_folder
+    from fgbaseline.data.formats.files.atomic_folder import atomic_folder
     from fgbaseline.data.wording import plural
 
     from ..results.json_files import COMPARISON, document_in, read_document

@@ -91,7 +91,7 @@ def simulate(
     Exits 0, or 2 on bad input.
     """
     from fgbaseline.data import read, write_npz
-    from fgbaseline.data.formats.atomic_write import require_new
+    from fgbaseline.data.formats.files.atomic_write import require_new
     from fgbaseline.data.simulate import SimulatedImu, Simulation
     from fgbaseline.data.simulate import simulate as simulated
     from fgbaseline.data.wording import plural

@@ -94,7 +94,7 @@ def run(
     input.
     """
     from fgbaseline.data import LandmarkMode, TimeUnit
-    from fgbaseline.data.user_estimator import load_all
+    from fgbaseline.data.estimators.user_estimator import load_all
 
     from ..run.command import run as run_and_report
     from ..run.settings import RunSettings

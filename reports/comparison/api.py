@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
-from fgbaseline.data.formats.file_errors import FilePath, as_path
-from fgbaseline.data.formats.trajectory_opening import open_named
+from fgbaseline.data.formats.files.file_errors import FilePath, as_path
+from fgbaseline.data.formats.trajectories.opening import open_named
 from fgbaseline.geometry import InputError
 
 from ..python_interface import for_python

@@ -9,7 +9,7 @@ from fgbaseline.compare import Criterion, Trust, Verdict
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import HeldOut, LandmarkMode, Landmarks, Problem, Sequence, Trajectory, read, read_problem
-from fgbaseline.data.formats.file_errors import reading
+from fgbaseline.data.formats.files.file_errors import reading
 from fgbaseline.geometry import InputError
 
 from ..results.json_files import SUMMARY

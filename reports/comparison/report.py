@@ -16,7 +16,7 @@ from fgbaseline.compare.trajectory_comparison.computation import PairedEntries, 
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import write_tum
 from fgbaseline.data.dataframes import as_cell_value
-from fgbaseline.data.formats.file_errors import FilePath
+from fgbaseline.data.formats.files.file_errors import FilePath
 
 from ..phrases import comparison as phrases
 from ..python_interface import NotebookResult, for_python, write_report

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 
 from fgbaseline.compare import MatchedTrajectories
 from fgbaseline.compare.statistics.descriptive import without_nan
-from fgbaseline.data.formats.atomic_write import atomic_write
+from fgbaseline.data.formats.files.atomic_write import atomic_write
 from fgbaseline.geometry import FloatArray
 
 from .comparison_data import ComparisonData, of_comparison

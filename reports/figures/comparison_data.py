@@ -11,7 +11,7 @@ import numpy as np
 from fgbaseline import compare
 from fgbaseline.compare import Align
 from fgbaseline.compare.column_tables import Columns, of_frame
-from fgbaseline.data.formats.file_errors import reading
+from fgbaseline.data.formats.files.file_errors import reading
 from fgbaseline.data.top_view import TopView
 from fgbaseline.geometry import FloatArray, InputError
 

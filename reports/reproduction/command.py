@@ -14,7 +14,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
+from fgbaseline.data.formats.files.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import InputError
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from fgbaseline.data.formats.file_errors import reading, regular_file, shown
+from fgbaseline.data.formats.files.file_errors import reading, regular_file, shown
 from fgbaseline.geometry import InputError
 
 SUMMARY = "summary.json"

@@ -12,8 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from fgbaseline.data import Landmarks, Trajectory
 from fgbaseline.data.finding import AS_GIVEN, UNITS
 from fgbaseline.data.formats import read_landmarks, read_trajectory
-from fgbaseline.data.formats.file_errors import reading, regular_file
-from fgbaseline.data.toml_file import is_finite_number
+from fgbaseline.data.formats.files.file_errors import reading, regular_file
+from fgbaseline.data.formats.files.toml_file import is_finite_number
 from fgbaseline.geometry import InputError
 
 from .json_files import INFINITE, SUMMARY, document_in, leaves, read_document

@@ -20,8 +20,8 @@ from fgbaseline.data import (
     Truth,
 )
 from fgbaseline.data.dataframes import as_cell_value
-from fgbaseline.data.estimator_runner import no_progress
-from fgbaseline.data.formats.file_errors import FilePath, as_path
+from fgbaseline.data.estimators.runner import no_progress
+from fgbaseline.data.formats.files.file_errors import FilePath, as_path
 
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
 from ..phrases.run import verdict

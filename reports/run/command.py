@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from fgbaseline.data import Excluded, Problem, write_npz
-from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
+from fgbaseline.data.formats.files.atomic_folder import atomic_folder, require_free
 from fgbaseline.data.parallel import background_map, cores
 from fgbaseline.data.problem_export import layout, write_problem
 from fgbaseline.data.tracking import Pictures

@@ -6,8 +6,8 @@ from pathlib import Path
 import click
 
 from fgbaseline.data import Sequence
-from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
-from fgbaseline.data.formats.atomic_write import atomic_write, require_new
+from fgbaseline.data.formats.files.atomic_folder import atomic_folder, require_free
+from fgbaseline.data.formats.files.atomic_write import atomic_write, require_new
 from fgbaseline.diagnosis import diagnose, repairs_text
 from fgbaseline.geometry import InputError
 

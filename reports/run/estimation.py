@@ -13,7 +13,7 @@ from fgbaseline.compare.trajectory_comparison.conventions import Source
 from fgbaseline.compare.trajectory_comparison.reprojection import up_of_problem
 from fgbaseline.compare.trajectory_comparison.settings import Settings
 from fgbaseline.data import Estimate, Excluded, HeldOut, Problem, Trajectory, find_estimator
-from fgbaseline.data.estimator_runner import Watch, no_progress, solve_all
+from fgbaseline.data.estimators.runner import Watch, no_progress, solve_all
 from fgbaseline.data.triangulate_landmarks import landmarks_along
 from fgbaseline.geometry import InputError
 

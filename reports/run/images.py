@@ -4,9 +4,9 @@ from pathlib import Path
 
 import click
 
-from fgbaseline.data.formats.atomic_write import require_new
-from fgbaseline.data.formats.file_errors import shown
-from fgbaseline.data.toml_file import read_toml
+from fgbaseline.data.formats.files.atomic_write import require_new
+from fgbaseline.data.formats.files.file_errors import shown
+from fgbaseline.data.formats.files.toml_file import read_toml
 from fgbaseline.data.tracking import (
     ImageOptions,
     Pictures,

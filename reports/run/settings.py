@@ -18,10 +18,10 @@ from fgbaseline.data import (
     estimator_names,
     find_estimator,
 )
+from fgbaseline.data.estimators.user_estimator import load_all
 from fgbaseline.data.formats import BodyFrame, ParsedTrajectory
 from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.tracking import Cameras
-from fgbaseline.data.user_estimator import load_all
 from fgbaseline.geometry import InputError
 
 from .defaults import DEFAULT_ESTIMATORS, ONE_CAMERA_ESTIMATORS, names_in

@@ -9,7 +9,7 @@ import gtsam
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
+from fgbaseline.data.estimators.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
 from fgbaseline.data.problem import Problem
 from fgbaseline.data.velocity_increments import dead_reckoned_path
 

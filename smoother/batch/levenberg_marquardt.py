@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import gtsam
 
-from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.estimators.estimate import Landmarks
 from fgbaseline.data.problem import Problem
 
 from ..graph.frame_states import FrameStates

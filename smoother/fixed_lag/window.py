@@ -6,7 +6,7 @@ from collections.abc import Collection
 import gtsam
 import numpy as np
 
-from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.estimators.estimate import Landmarks
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray

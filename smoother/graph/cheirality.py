@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.estimators.estimate import Landmarks
 from fgbaseline.data.observations import BoolArray, Observations
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import Camera, FloatArray

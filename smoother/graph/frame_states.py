@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 import gtsam
 import numpy as np
 
-from fgbaseline.data.estimate import Estimate, Landmarks
+from fgbaseline.data.estimators.estimate import Estimate, Landmarks
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, strapdown
 

@@ -7,7 +7,7 @@ from typing import Any
 import gtsam
 import numpy as np
 
-from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.estimators.estimate import Landmarks
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3, so3, strapdown
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fgbaseline.data.estimate import Landmarks
+from fgbaseline.data.estimators.estimate import Landmarks
 from fgbaseline.data.observations import BoolArray, IntArray, Observations
 from fgbaseline.data.problem import Excluded, Problem
 from fgbaseline.data.triangulate_landmarks import landmarks_along

@@ -7,7 +7,7 @@ import gtsam
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fgbaseline.data.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
+from fgbaseline.data.estimators.estimate import Estimate, Event, EventKind, Landmarks, Progress, Status
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray
 

@@ -6,7 +6,7 @@ from collections.abc import Collection
 import gtsam
 import numpy as np
 
-from fgbaseline.data.estimate import Event, EventKind, Landmarks, Progress
+from fgbaseline.data.estimators.estimate import Event, EventKind, Landmarks, Progress
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray

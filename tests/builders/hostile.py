@@ -12,7 +12,7 @@ import numpy as np
 from fgbaseline import data, diagnosis
 from fgbaseline.compare.estimate_comparison import Result, Run, compare_all
 from fgbaseline.data import Observations, Sequence, Truth
-from fgbaseline.data.estimator_runner import solve_all
+from fgbaseline.data.estimators.runner import solve_all
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.simulate import KITTI, Simulation, simulate
 from fgbaseline.geometry import FloatArray, se3

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fgbaseline import data
-from fgbaseline.data.estimate import Estimate
+from fgbaseline.data.estimators.estimate import Estimate
 from fgbaseline.data.imu import ImuNoise, ImuSamples
 from fgbaseline.data.problem import InverseDepthPrior, Problem
 from fgbaseline.data.problem.inertial import InertialStart, imu_intervals

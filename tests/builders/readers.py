@@ -15,7 +15,7 @@ import numpy as np
 
 from fgbaseline import data, diagnosis
 from fgbaseline.data.formats import read_euroc, read_landmarks, read_times, read_trajectory
-from fgbaseline.data.formats.trajectory_reader import read_pose_covariances
+from fgbaseline.data.formats.trajectories.reader import read_pose_covariances
 from fgbaseline.data.problem_export import read_problem, write_problem
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.accuracy_check.limits import read_limits

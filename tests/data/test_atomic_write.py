@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fgbaseline.data.formats.atomic_write import atomic_write
+from fgbaseline.data.formats.files.atomic_write import atomic_write
 from fgbaseline.geometry import InputError
 
 from ..builders.commands import everything_in

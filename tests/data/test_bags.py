@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from fgbaseline.data.formats import read_trajectory, write_tum
-from fgbaseline.data.formats.bag_file import is_bag
-from fgbaseline.data.formats.bag_trajectory import read_bag_trajectory
+from fgbaseline.data.formats.files.bag_file import is_bag
+from fgbaseline.data.formats.trajectories.bag_topic import read_bag_trajectory
 from fgbaseline.data.tracking import ImageOptions, track
 from fgbaseline.data.tracking.sources import open_recording
 from fgbaseline.data.tracking.sources.image_recording import TruthFile

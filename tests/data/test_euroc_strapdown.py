@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fgbaseline.data.formats.imu_csv import read_imu_csv
-from fgbaseline.data.formats.imu_yaml import read_imu_calibration
+from fgbaseline.data.formats.inertial.imu_csv import read_imu_csv
+from fgbaseline.data.formats.inertial.imu_yaml import read_imu_calibration
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.geometry import so3, strapdown
 

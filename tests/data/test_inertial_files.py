@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
-from fgbaseline.data.formats.imu_csv import read_imu_csv
-from fgbaseline.data.formats.imu_yaml import read_imu_calibration
-from fgbaseline.data.formats.velocity_csv import read_velocity_csv
+from fgbaseline.data.formats.inertial.imu_csv import read_imu_csv
+from fgbaseline.data.formats.inertial.imu_yaml import read_imu_calibration
+from fgbaseline.data.formats.inertial.velocity_csv import read_velocity_csv
 from fgbaseline.data.imu import ASSUMED_NOISE, ImuNoise
 from fgbaseline.data.problem.imu_gaps import interval_densities, sample_gaps
 from fgbaseline.data.problem.inertial import imu_intervals

@@ -7,7 +7,7 @@ from typing import Literal
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from fgbaseline.data.toml_file import key_path, read_toml
+from fgbaseline.data.formats.files.toml_file import key_path, read_toml
 from fgbaseline.geometry import InputError
 
 

@@ -13,7 +13,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from fgbaseline.data import Observations, Sequence
-from fgbaseline.data.formats.npz_writer import write_tracks
+from fgbaseline.data.formats.recordings.npz_writer import write_tracks
 from fgbaseline.data.observations import IntArray
 from fgbaseline.data.tracking import Pictures, StereoTracker, TrackerSettings, Tracks, track
 from fgbaseline.data.tracking.rectification import CameraModel, Distortion, rectify

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fgbaseline.data.formats import attach_truth, read, write_tum
-from fgbaseline.data.formats.ground_truth import match_stamps
+from fgbaseline.data.formats.recordings.ground_truth import match_stamps
 from fgbaseline.geometry import InputError, se3
 
 from ..builders.inertial_paths import inertial_recording, turn

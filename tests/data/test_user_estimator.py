@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fgbaseline import data
-from fgbaseline.data.estimator_runner import solve_all
-from fgbaseline.data.user_estimator import load_all, parse
+from fgbaseline.data.estimators.runner import solve_all
+from fgbaseline.data.estimators.user_estimator import load_all, parse
 from fgbaseline.geometry import InputError
 
 from ..builders.synthetic import drive, matched

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from fgbaseline import ekf
 from fgbaseline.data import Estimate, HuberKernel, Problem
-from fgbaseline.data.registry import Estimator
+from fgbaseline.data.estimators.registry import Estimator
 from fgbaseline.data.simulate.settings import PathName
 from fgbaseline.ekf import GyroBiasPrior, JointSettings, Linearization
 from fgbaseline.geometry import FgbaselineError, FloatArray, se3, so3, strapdown

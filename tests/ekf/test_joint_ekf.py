@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from fgbaseline import data, ekf
 from fgbaseline.data import Estimate, EventKind, Excluded, HuberKernel, Observations, Problem, Sequence, Status
-from fgbaseline.data.registry import Estimator
+from fgbaseline.data.estimators.registry import Estimator
 from fgbaseline.ekf import JointSettings, LandmarkRepresentation, Linearization
 from fgbaseline.ekf.joint.gating import gate_observations
 from fgbaseline.ekf.joint.landmark_representation import (

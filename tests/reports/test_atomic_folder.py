@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from fgbaseline.data.formats.atomic_folder import atomic_folder, require_free
+from fgbaseline.data.formats.files.atomic_folder import atomic_folder, require_free
 from fgbaseline.geometry import InputError
 
 from ..builders.commands import everything_in
@@ -65,7 +65,7 @@ def test_a_folder_created_after_the_last_check_is_not_replaced(tmp_path: Path, m
             place.mkdir()
             (place / MARK).write_text("of another process")
 
-    monkeypatch.setattr("fgbaseline.data.formats.atomic_folder.require_free", late)
+    monkeypatch.setattr("fgbaseline.data.formats.files.atomic_folder.require_free", late)
     with pytest.raises(InputError, match="the folder exists"):
         written(tmp_path / "out", "new")
     assert everything_in(tmp_path) == {"out", f"out/{MARK}"}
@@ -133,7 +133,7 @@ def test_the_old_folder_or_the_new_one_survives_a_failure_at_every_step_of_the_e
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, when: str, which: int
 ) -> None:
     written(tmp_path / "out", "old")
-    monkeypatch.setattr("fgbaseline.data.formats.atomic_folder.exchanged", lambda *_: False)
+    monkeypatch.setattr("fgbaseline.data.formats.files.atomic_folder.exchanged", lambda *_: False)
     rename, calls = Path.rename, 0
 
     def failing(self: Path, target: Path) -> Path:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from fgbaseline.compare.acceptance_limits import Better, Bounds, Outcome, around, rounded
 from fgbaseline.data.finding import AS_GIVEN, UNITS
-from fgbaseline.data.toml_file import TomlFile
+from fgbaseline.data.formats.files.toml_file import TomlFile
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
 from fgbaseline.reports.accuracy_check.limits import Limits, read_limits

@@ -11,7 +11,7 @@ import pytest
 
 from fgbaseline.compare.estimate_comparison import compare_all
 from fgbaseline.data import Estimate, Problem
-from fgbaseline.data.estimator_runner import solve_all
+from fgbaseline.data.estimators.runner import solve_all
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.ekf import decoupled_ekf
 from fgbaseline.ekf.pose_update import PoseInnovation

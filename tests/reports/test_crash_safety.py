@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from fgbaseline import data
-from fgbaseline.data.formats.atomic_folder import atomic_folder, exchanged
+from fgbaseline.data.formats.files.atomic_folder import atomic_folder, exchanged
 from fgbaseline.geometry import InputError
 
 from ..builders.commands import COMMAND, everything_in, fgbaseline, started
@@ -27,7 +27,7 @@ WRITER = """
 import sys
 from itertools import count
 from pathlib import Path
-from fgbaseline.data.formats.atomic_folder import atomic_folder
+from fgbaseline.data.formats.files.atomic_folder import atomic_folder
 
 print("ready", flush=True)
 for n in count():
@@ -41,7 +41,7 @@ RIVAL = """
 import os, sys, time
 from pathlib import Path
 from fgbaseline.geometry import InputError
-from fgbaseline.data.formats.atomic_folder import atomic_folder
+from fgbaseline.data.formats.files.atomic_folder import atomic_folder
 
 print("ready", flush=True)
 sys.stdin.readline()
@@ -233,7 +233,7 @@ def test_two_folders_exchange_their_names(tmp_path: Path) -> None:
 def test_where_the_system_cannot_exchange_names_the_folder_is_replaced_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unable: Callable[..., int] | None
 ) -> None:
-    monkeypatch.setattr("fgbaseline.data.formats.atomic_folder._renameat2", lambda: unable)
+    monkeypatch.setattr("fgbaseline.data.formats.files.atomic_folder._renameat2", lambda: unable)
     monkeypatch.setattr("ctypes.get_errno", lambda: 38)
     for text in ("old", "new"):
         with atomic_folder(tmp_path / "out", force=True, mark=MARK) as folder:

@@ -9,8 +9,8 @@ import pytest
 
 import fgbaseline
 from fgbaseline import data
+from fgbaseline.data.estimators.user_estimator import load_all
 from fgbaseline.data.simulate import Simulation, simulate
-from fgbaseline.data.user_estimator import load_all
 from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.comparison import compare
 from fgbaseline.reports.run.estimation import read_added, solve

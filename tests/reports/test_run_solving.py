@@ -10,8 +10,9 @@ import pytest
 
 from fgbaseline import ekf
 from fgbaseline.compare.estimate_comparison import compare_all
-from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress, Status, estimator_runner
-from fgbaseline.data.estimator_runner import solve_all
+from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress, Status
+from fgbaseline.data.estimators import runner as estimator_runner
+from fgbaseline.data.estimators.runner import solve_all
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.run.estimation import batch_is_added, solve
 from fgbaseline.reports.run.problem import read_sequence

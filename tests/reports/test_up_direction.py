@@ -7,7 +7,7 @@ import pytest
 from evo.tools import file_interface
 
 from fgbaseline import data
-from fgbaseline.data.formats.trajectory_reader import read_trajectory_file
+from fgbaseline.data.formats.trajectories.reader import read_trajectory_file
 from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.comparison import ComparisonReport, compare
 from fgbaseline.reports.figures.comparison_data import of_comparison

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from fgbaseline import smoother
 from fgbaseline.data import Estimate, Problem, Status
-from fgbaseline.data.estimate import EventKind
+from fgbaseline.data.estimators.estimate import EventKind
 from fgbaseline.geometry import FloatArray, se3, so3, strapdown
 from fgbaseline.geometry.measurement_model import three_rows
 from fgbaseline.smoother import FixedLagSettings, ISAM2Settings

@@ -9,10 +9,10 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from ...formats.bag_file import Bag, open_bag_file
-from ...formats.file_errors import shown
-from ...formats.imu_samples import RawSamples, imu_samples
-from ...formats.imu_yaml import assumed_calibration, read_imu_calibration
+from ...formats.files.bag_file import Bag, open_bag_file
+from ...formats.files.file_errors import shown
+from ...formats.inertial.imu_samples import RawSamples, imu_samples
+from ...formats.inertial.imu_yaml import assumed_calibration, read_imu_calibration
 from .camera_yaml import read_rig
 from .image_files import EightBits, Raw, decoded
 from .image_recording import ONE_CAMERA, ImagePair, ImageRecording

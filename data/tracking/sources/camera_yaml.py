@@ -7,8 +7,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from ...formats.file_errors import FilePath, reading
-from ...formats.yaml_file import pose, read_yaml
+from ...formats.files.file_errors import FilePath, reading
+from ...formats.files.yaml_file import pose, read_yaml
 from ..rectification import CameraModel, Distortion
 
 MODELS = {"radtan": Distortion.RADTAN, "radial-tangential": Distortion.RADTAN, "equidistant": Distortion.EQUIDISTANT}

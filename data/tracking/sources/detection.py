@@ -7,12 +7,12 @@ from typing import Literal
 
 from fgbaseline.geometry import InputError, se3
 
-from ...formats.bag_file import METADATA, STORAGE, is_bag
-from ...formats.file_errors import reading, shown
-from ...formats.imu_attachment import read_imu
-from ...formats.imu_yaml import NO_CALIBRATION, calibration_or_assumed, read_imu_calibration
-from ...formats.kitti import read_extrinsic
-from ...formats.velocity_csv import read_velocity_csv
+from ...formats.files.bag_file import METADATA, STORAGE, is_bag
+from ...formats.files.file_errors import reading, shown
+from ...formats.inertial.imu_attachment import read_imu
+from ...formats.inertial.imu_yaml import NO_CALIBRATION, calibration_or_assumed, read_imu_calibration
+from ...formats.inertial.velocity_csv import read_velocity_csv
+from ...formats.trajectories.kitti import read_extrinsic
 from .bags import open_bag
 from .euroc import open_euroc
 from .image_folders import open_two_folders

@@ -16,9 +16,9 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from ...formats.file_errors import reading, shown
-from ...formats.imu_attachment import read_imu
-from ...formats.imu_yaml import ImuCalibration, calibration_or_assumed
+from ...formats.files.file_errors import reading, shown
+from ...formats.inertial.imu_attachment import read_imu
+from ...formats.inertial.imu_yaml import ImuCalibration, calibration_or_assumed
 from ...observations import IntArray
 from ...wording import plural
 from .camera_yaml import Rig, read_rig, read_sensor_yaml

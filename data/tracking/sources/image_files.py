@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fgbaseline.geometry import InputError
 
-from ...formats.file_errors import reading, shown
+from ...formats.files.file_errors import reading, shown
 from ..opencv import opencv
 from ..rectification import Image
 from .image_recording import ImagePair

@@ -6,8 +6,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from ...formats.file_errors import shown
-from ...formats.kitti import read_times
+from ...formats.files.file_errors import shown
+from ...formats.trajectories.kitti import read_times
 from ...wording import plural
 from .camera_yaml import read_rig
 from .image_files import file_pairs, image_files, size_of

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from fgbaseline.geometry import FloatArray
 
-from ...formats.ground_truth import BodyFrame
-from ...formats.imu_samples import RawSamples
+from ...formats.inertial.imu_samples import RawSamples
+from ...formats.recordings.ground_truth import BodyFrame
 from ...sequence import Truth
 from ..rectification import CameraModel, Image
 

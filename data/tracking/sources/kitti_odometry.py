@@ -15,8 +15,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from ...formats.file_errors import reading, regular_file, shown
-from ...formats.kitti import read_times
+from ...formats.files.file_errors import reading, regular_file, shown
+from ...formats.trajectories.kitti import read_times
 from ...wording import plural
 from ..rectification import CameraModel, Distortion
 from .image_files import file_pairs, image_files, size_of

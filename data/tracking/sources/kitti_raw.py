@@ -15,7 +15,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError, se3, so3
 
-from ...formats.file_errors import reading, regular_file, shown
+from ...formats.files.file_errors import reading, regular_file, shown
 from ...observations import IntArray
 from ...sequence import Truth
 from ...wording import plural

@@ -8,7 +8,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray, InputError
 
-from ...formats.ground_truth import match_stamps
+from ...formats.recordings.ground_truth import match_stamps
 from ...observations import IntArray
 from ...wording import plural
 

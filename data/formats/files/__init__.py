@@ -1,0 +1,1 @@
+"""Containers of numbers and text, whatever they hold: npz, MATLAB, bags, text tables, YAML, TOML; atomic writing."""

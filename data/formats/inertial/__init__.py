@@ -1,0 +1,1 @@
+"""Raw inertial samples, their noise and their ground truth in files; body velocities."""

@@ -1,0 +1,1 @@
+"""Time stamps in files: their units, and stamps of frames."""
