@@ -32,7 +32,7 @@ AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | tuple[Floa
 AT_LEAST = ("coverage", "pairs")
 """metrics with lower limits; all others have upper limits"""
 UNITS = {"coverage": "", "pairs": "", "rotation.rmse": " (°)"}
-"""of metrics that are not in meters"""
+"""units of the metrics that are not in meters"""
 
 
 def assert_accuracy(

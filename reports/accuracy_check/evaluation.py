@@ -109,7 +109,6 @@ def _lines(
     old, unknown = baseline_value(baseline, name, run, estimator, limit.metric)
     shortage = _shortage(limits.content, limit, values)
     doubt = shortage.reason if shortage else _doubt(limit, run, limits.content.reference)
-
     left_out, place = missing_in(values, limit.metric), f"limit[{index}]"
 
     def line(value: float | None, bounds: Bounds | None, tolerance: str) -> Line:
