@@ -2,7 +2,7 @@
 
 Each run is a process of its own, so that imports count. What is wanted is asked of all that is not an estimator:
 imports, reading, posing (the diagnosis), comparison, figures, tables and page, in the order and with the forks of
-`reports/cli/report.py`. Seconds are of the clock on the wall; a figure is worth as much as the machine was idle.
+`reports/run/command.py`. Seconds are of the clock on the wall; a figure is worth as much as the machine was idle.
 """
 
 # ruff: noqa: E402

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, RmseDifference, is_level
+from fgbaseline.compare import MIN_COVERAGE, MIN_SAMPLE_SIZE, RmseDifference, is_claimed, is_level
 from fgbaseline.compare.divergence_onset import FAR, FAR_SHARE
+from fgbaseline.compare.statistics.paired_bootstrap import MIN_DIFFERENCE
 from fgbaseline.compare.trajectory_comparison.comparison import Comparison, Result
 from fgbaseline.compare.trajectory_comparison.sample_sizes import coverage
 from fgbaseline.data.wording import capitalized, plural
@@ -175,17 +176,32 @@ def _over_common(comparison: Comparison) -> list[str]:
 
 def _order(comparison: Comparison) -> list[str]:
     behind = {n: d for n, d in comparison.behind.items() if not _is_unresolved(comparison.results[n])}
-    return significance_sentences(comparison.ranking.rivals[0], behind) if behind else []
+    rmse = {name: comparison.ranking.rmse(name) for name in comparison.ranking.rivals}
+    return significance_sentences(rmse, behind) if behind else []
 
 
-def significance_sentences(first: str, behind: Mapping[str, RmseDifference]) -> list[str]:
-    """Paired differences from the estimate with the smallest RMSE, `first`: the significant ones, and the others."""
-    titles = {True: f"Larger position RMSE than {first}", False: f"No significant difference from {first}"}
+def significance_sentences(rmse: Mapping[str, float], behind: Mapping[str, RmseDifference]) -> list[str]:
+    """Paired differences from the smallest RMSE: the claimed ones, those within `MIN_DIFFERENCE`, and the others.
+
+    `rmse` is by name, smallest first.
+    """
+    first = next(iter(rmse))
+    larger, level, other = (
+        f"Larger position RMSE than {first}, by paired bootstrap",
+        f"Same position RMSE as {first} within {limit_per_cent(MIN_DIFFERENCE)}",
+        f"No significant difference from {first}, by paired bootstrap",
+    )
+
+    def title(name: str) -> str:
+        if is_claimed(behind[name], rmse[name], rmse[first]):
+            return larger
+        return level if is_level(rmse[name], rmse[first]) else other
+
     groups = grouped(
-        (d.settled, f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])")
+        (title(name), f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])")
         for name, d in behind.items()
     )
-    return [f"{titles[k]}, by paired bootstrap: {listed(groups[k])}." for k in titles if k in groups]
+    return [f"{title}: {listed(groups[title])}." for title in (larger, level, other) if title in groups]
 
 
 def _signed(meters: float) -> str:

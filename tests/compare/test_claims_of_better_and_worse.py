@@ -13,7 +13,7 @@ from fgbaseline import compare
 from fgbaseline.compare.estimate_comparison import Run
 from fgbaseline.geometry import FloatArray
 from fgbaseline.reports.phrases.bench import winner
-from fgbaseline.reports.phrases.evidence import held_out_sentences
+from fgbaseline.reports.phrases.evidence import held_out_sentences, significance_sentences
 from fgbaseline.reports.phrases.run_accuracy import ate_sentences, divergence_sentences
 from fgbaseline.reports.results.bench import BENCH_METRICS
 from fgbaseline.reports.tables.run import main_table
@@ -107,6 +107,19 @@ def test_a_difference_below_one_percent_is_not_claimed() -> None:
     errors = {"isam2": np.full(FRAMES, larger), "ekf": np.full(FRAMES, smaller)}
     said = ate_sentences(run_with(errors, errors))
     assert said[1:] == ["The ATE of ekf and isam2 is the same within 1 %: not ranked."]
+
+
+def test_a_comparison_of_files_claims_from_the_same_difference_on() -> None:
+    rmse = {"first": 1.0, "level": 1.0099, "larger": 1.0101, "unsure": 1.5}
+    behind = {
+        name: compare.RmseDifference(value - 1.0, -1.0 if name == "unsure" else 0.5 * (value - 1.0), 2.0, 1, 50.0, True)
+        for name, value in rmse.items()
+        if name != "first"
+    }
+    larger, level, other = significance_sentences(rmse, behind)
+    assert larger.startswith("Larger position RMSE than first, by paired bootstrap: larger (")
+    assert level.startswith("Same position RMSE as first within 1 %: level (")
+    assert other.startswith("No significant difference from first, by paired bootstrap: unsure (")
 
 
 def test_the_minimum_of_the_same_graph_is_not_ranked_against_the_reference() -> None:

@@ -63,13 +63,13 @@ def test_words_and_sign_agree_and_every_rank_is_over_the_moments_that_all_have(
     for name in taking_part:
         assert ranking.rmse(name) == pytest.approx(over_common[name], rel=1e-9)
     assert [over_common[name] for name in ranking.rivals] == pytest.approx(sorted(over_common.values()))
-    words = significance_sentences(ranking.rivals[0], ranking.behind)
+    words = significance_sentences({name: ranking.rmse(name) for name in ranking.rivals}, ranking.behind)
     assert "\N{MINUS SIGN}" not in "".join(words).split("[")[0]
     for name, d in ranking.behind.items():
         assert d.value == pytest.approx(over_common[name] - over_common[ranking.rivals[0]], abs=1e-12)
         assert d.value >= 0.0
         farther = any(s.startswith("Larger position RMSE than") and f"{name} (" in s for s in words)
-        assert farther == d.settled
+        assert farther == figures.is_claimed(d, ranking.rmse(name), ranking.rmse(ranking.rivals[0]))
         assert not farther or (d.value > 0.0 and d.low > 0.0)
 
 

@@ -1,6 +1,6 @@
 """Opens trajectory files: detects format (TUM, EuRoC, KITTI, CSV, npz) and columns, and parses the fields as numbers.
 
-Stamps and poses are checked later (`trajectory_text_parser`). This module is plain Python, so that a missing or broken
+Stamps and poses are checked later (`text_parser`). This module is plain Python, so that a missing or broken
 file is reported before numpy is imported. A comparison opens all of its files before it parses the first.
 """
 

@@ -1,7 +1,7 @@
 """Reads trajectories: TUM, EuRoC, KITTI and other CSV, npz, and topics of bags.
 
-The format is detected from the content, never from the file name: `trajectory_opening` opens a file,
-`trajectory_columns` recognizes its columns, and `trajectory_text_parser` parses its lines.
+The format is detected from the content, never from the file name: `format_detection` opens a file,
+`columns` recognizes its columns, and `text_parser` parses its lines.
 """
 
 from dataclasses import replace

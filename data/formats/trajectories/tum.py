@@ -1,6 +1,6 @@
 """TUM files are read and written: `timestamp tx ty tz qx qy qz qw` a line, s and m.
 
-`trajectory_opening` detects the format of any trajectory, TUM included; `trajectory_text_parser` parses all text
+`format_detection` detects the format of any trajectory, TUM included; `text_parser` parses all text
 formats.
 """
 
