@@ -76,17 +76,6 @@ if TYPE_CHECKING:
         time_coverage,
     )
     from .trajectory.delta_pairs import Unit, pose_pairs
-    from .trajectory.divergence import (
-        Exceedance,
-        divergence,
-        divergence_along_path,
-        divergence_growth,
-        divergence_summary,
-        first_exceedance,
-        pose_errors,
-        truth_alignment,
-        truth_errors,
-    )
     from .trajectory.drift import drift
     from .trajectory.error_decomposition import ErrorDecomposition, decomposition_intervals, error_decomposition
     from .trajectory.frame_conventions import (
@@ -98,6 +87,17 @@ if TYPE_CHECKING:
         rmse_of_inverse_poses,
         travel_direction_misfit,
         world_rotation_from_positions,
+    )
+    from .trajectory.pose_errors import (
+        Exceedance,
+        divergence,
+        divergence_along_path,
+        divergence_growth,
+        divergence_summary,
+        first_exceedance,
+        pose_errors,
+        truth_alignment,
+        truth_errors,
     )
     from .trajectory.segments import SegmentErrors, segment_errors
     from .trajectory.time_offset import TimeOffset, time_offset
@@ -137,8 +137,8 @@ else:
             "trajectory.coverage": "MIN_COVERAGE MIN_SAMPLE_SIZE MIN_STRETCHES interval_coverage is_insufficient "
             "time_coverage",
             "trajectory.delta_pairs": "Unit pose_pairs",
-            "trajectory.divergence": "Exceedance divergence divergence_along_path divergence_growth divergence_summary "
-            "first_exceedance pose_errors truth_alignment truth_errors",
+            "trajectory.pose_errors": "Exceedance divergence divergence_along_path divergence_growth "
+            "divergence_summary first_exceedance pose_errors truth_alignment truth_errors",
             "trajectory.drift": "drift",
             "trajectory.error_decomposition": "ErrorDecomposition decomposition_intervals error_decomposition",
             "trajectory.frame_conventions": "BodyRotation body_rotation has_conjugated_orientations "

@@ -2,12 +2,13 @@
 
 from fgbaseline.data.problem import NoiseSettings
 
+from .body_velocity.pipeline import diagnose, known_units
+from .body_velocity.result import Diagnosis
 from .calibrated import AsRecordedSettings, calibrated
 from .conventions.units import Units, unit_findings
 from .findings.json_report import to_json
 from .findings.track_statistics import TrackStatistics, track_statistics
 from .findings.velocity_findings import findings_of, not_identifiable
-from .held_out import hold_out
 from .inertial.findings import inertial_findings
 from .inertial.json_report import inertial_sentences, inertial_to_json
 from .inertial.pipeline import diagnose_inertial
@@ -15,9 +16,8 @@ from .inertial.result import InertialDiagnosis
 from .repair_overrides.settings import Repairs, read_repairs
 from .repair_overrides.template import repairs_text
 from .repairs.repaired_sequence import Repaired, repair
+from .track_holdout import hold_out
 from .tracks.recording_faults import unusable
-from .velocity_diagnosis.pipeline import diagnose, known_units
-from .velocity_diagnosis.result import Diagnosis
 
 __all__ = [
     "AsRecordedSettings",

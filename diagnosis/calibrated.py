@@ -12,6 +12,8 @@ from fgbaseline.data.velocity_increments import Shift, dead_reckoned_path, incre
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import HuberKernel, InputError
 
+from .body_velocity.pipeline import diagnose
+from .body_velocity.result import Diagnosis
 from .findings.track_statistics import track_statistics
 from .findings.velocity_findings import findings_of, rescalings
 from .inertial.pipeline import diagnose_inertial
@@ -23,8 +25,6 @@ from .repair_overrides.settings import Repairs
 from .repairs.repaired_sequence import repair
 from .repairs.visual_dropouts import averaged_over_dropouts, dropout_intervals
 from .tracks.observation_mask import MaskSettings, choose_features, exclusions
-from .velocity_diagnosis.pipeline import diagnose
-from .velocity_diagnosis.result import Diagnosis
 
 
 @dataclass(frozen=True, slots=True)

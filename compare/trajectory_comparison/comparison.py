@@ -8,9 +8,9 @@ from fgbaseline.compare.column_tables import Columns
 from fgbaseline.compare.statistics.block_bootstrap import ErrorStatistics
 from fgbaseline.compare.statistics.paired_bootstrap import RmseDifference
 from fgbaseline.compare.trajectory.association import MatchedTrajectories
-from fgbaseline.compare.trajectory.divergence import Exceedance
 from fgbaseline.compare.trajectory.drift import Rate
 from fgbaseline.compare.trajectory.error_decomposition import ErrorDecomposition, ShareIntervals
+from fgbaseline.compare.trajectory.pose_errors import Exceedance
 from fgbaseline.compare.trajectory.segments import SegmentErrors
 from fgbaseline.compare.trajectory.time_offset import TimeOffset
 from fgbaseline.compare.trajectory_comparison.inputs import Entry

@@ -10,9 +10,9 @@ from fgbaseline import compare
 from fgbaseline.compare import Align, Exceedance, MatchedTrajectories, TimeOffset
 from fgbaseline.compare.column_tables import Columns
 from fgbaseline.compare.trajectory.ate_rpe import absolute_error_columns, relative_error_columns
-from fgbaseline.compare.trajectory.divergence import divergence_columns
 from fgbaseline.compare.trajectory.drift import drift_rates
 from fgbaseline.compare.trajectory.error_decomposition import share_intervals
+from fgbaseline.compare.trajectory.pose_errors import divergence_columns
 from fgbaseline.compare.trajectory_comparison.comparison import ASSUMED_UP, Comparison, Result
 from fgbaseline.compare.trajectory_comparison.decimal_resolution import position_resolution, rotation_resolution_deg
 from fgbaseline.compare.trajectory_comparison.inputs import Entries, Entry

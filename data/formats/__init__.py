@@ -9,9 +9,9 @@ if TYPE_CHECKING:
     from .recordings.reader import read
     from .trajectories.columns import Order
     from .trajectories.euroc import read_euroc, write_euroc
+    from .trajectories.format_detection import TrajectoryFormat
     from .trajectories.kitti import read_kitti, read_times, write_kitti
     from .trajectories.npz import write_trajectory_npz
-    from .trajectories.opening import TrajectoryFormat
     from .trajectories.parsed_trajectory import ParsedTrajectory
     from .trajectories.reader import read_pose_covariances, read_trajectory, read_trajectory_file
     from .trajectories.tum import read_tum, write_tum
@@ -31,7 +31,7 @@ else:
             "trajectories.parsed_trajectory": "ParsedTrajectory",
             "recordings.reader": "read",
             "trajectories.npz": "write_trajectory_npz",
-            "trajectories.opening": "TrajectoryFormat",
+            "trajectories.format_detection": "TrajectoryFormat",
             "trajectories.reader": "read_pose_covariances read_trajectory read_trajectory_file",
         },
     )

@@ -16,13 +16,13 @@ from ..observations import BoolArray, Observations
 from ..sequence import Sequence, Truth
 from ..wording import plural
 from .monocular_tracker import MonocularTracker
-from .page_images import Pictures
-from .prediction import rotation_between
 from .rectification import Image, rectify
+from .rotation_prediction import rotation_between
 from .settings import TrackerSettings
 from .sources import ImageOptions, ImageRecording, open_recording
 from .sources.image_recording import TruthFile
 from .stereo_tracker import StereoTracker
+from .thumbnails import Pictures
 from .track_file import TrackFile
 
 NAMED = 4

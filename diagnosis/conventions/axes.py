@@ -9,7 +9,7 @@ from fgbaseline.data.axis_conventions import AXIS_CONVENTIONS, IDENTITY, axes_ma
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray, so3
 
-from ..robust_scale import CHI_SQUARE_MEDIAN
+from ..robust_constants import CHI_SQUARE_MEDIAN
 from .robust_regression import regress
 
 LAGS = (-2, -1, 0, 1, 2)

@@ -6,7 +6,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
-from ..robust_scale import MAD_TO_SIGMA
+from ..robust_constants import MAD_TO_SIGMA
 
 TUKEY = 4.685
 """sigmas, beyond which a residual has no weight (Tukey's biweight at 95 % efficiency)"""

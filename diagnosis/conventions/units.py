@@ -24,9 +24,9 @@ from fgbaseline.data.velocity_increments import zero_order_hold
 from fgbaseline.geometry import FloatArray
 
 from ..odometry.stereo_odometry import Odometry
+from .extrinsics_check import BASELINES, camera_distance, usual_rig
 from .neighbor_deviation import FAR_BLIND, among_neighbors
 from .rate_units import CALIBRATED, DEGREE, doubt_of_rate_unit, measured, of_no_unit
-from .rig_plausibility import BASELINES, camera_distance, usual_rig
 from .scale_ratio import ScaleRatio, scale_ratio
 
 THOUSANDS = (1.0, 1e-3, 1e3, 1e-6, 1e6, 1e-9, 1e9)

@@ -7,7 +7,7 @@ import numpy as np
 from fgbaseline.data.observations import BoolArray
 from fgbaseline.geometry import FloatArray
 
-from ..robust_scale import MAD_TO_SIGMA
+from ..robust_constants import MAD_TO_SIGMA
 from .spline import Spline, spline_through
 
 MAX_SHIFT = 3.0

@@ -11,8 +11,8 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.velocity_increments import Shift
 from fgbaseline.geometry import FloatArray
 
+from ..body_velocity.result import Diagnosis
 from ..conventions.axes import Axes
-from ..velocity_diagnosis.result import Diagnosis
 from .track_statistics import TrackStatistics, track_statistics
 from .velocity_findings import findings_of, not_identifiable
 

@@ -8,11 +8,11 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, disparity
 
+from ..body_velocity.result import Diagnosis
 from ..odometry.ransac import TRUNCATION
 from ..repairs.repaired_sequence import Repaired, repair
 from ..tracks.observation_mask import MaskSettings
 from ..tracks.track_segments import MAX_ROW_MISMATCH, MIN_DISPARITY, consecutive, is_usable
-from ..velocity_diagnosis.result import Diagnosis
 
 BURST = 1.0 / 3.0
 """share of wrong matches above which an interval is a burst of them"""

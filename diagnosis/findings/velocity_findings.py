@@ -10,12 +10,12 @@ from fgbaseline.data.velocity_increments import Shift, zero_order_hold
 from fgbaseline.data.wording import listed, noun, number, per_cent, plural, signed, vector
 from fgbaseline.geometry import FloatArray
 
+from ..body_velocity.result import Diagnosis
 from ..conventions.axes import Axes
 from ..conventions.units import LABELS, unit_findings
 from ..noise.calibration_fit import SIGNIFICANT
 from ..repairs.significance import significant_bias, significant_misalignment, significant_offset
-from ..tracks.image_size import intrinsics_findings
-from ..velocity_diagnosis.result import Diagnosis
+from ..tracks.intrinsics_check import intrinsics_findings
 from .frame_spans import spans
 from .track_findings import track_findings
 from .track_statistics import TrackStatistics, track_statistics

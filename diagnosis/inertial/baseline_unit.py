@@ -11,7 +11,7 @@ import numpy as np
 from fgbaseline.data.finding import Finding
 from fgbaseline.data.sequence import Sequence
 
-from ..conventions.rig_plausibility import FARTHEST_CAMERA, camera_distance, doubt_of_position, is_far, usual_rig
+from ..conventions.extrinsics_check import FARTHEST_CAMERA, camera_distance, doubt_of_position, is_far, usual_rig
 from ..conventions.units import TOLERANCE, Units, unit_findings
 from ..odometry.stereo_odometry import Odometry
 from .accelerations import MIN_CORRELATION, acceleration_changes

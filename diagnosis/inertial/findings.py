@@ -9,13 +9,13 @@ from fgbaseline.data.problem.imu_gaps import sample_gaps
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.wording import capitalized, plural
 
+from ..body_velocity.result import Diagnosis
 from ..findings.track_findings import track_findings
 from ..findings.track_statistics import TrackStatistics, track_statistics
 from ..monocular.initial_state import EXCITED, MonocularStart
 from ..repairs.repaired_sequence import Repaired, RepairedTracks, TrackRepairs, repaired_tracks
-from ..tracks.image_size import intrinsics_findings
+from ..tracks.intrinsics_check import intrinsics_findings
 from ..tracks.observation_mask import MaskSettings
-from ..velocity_diagnosis.result import Diagnosis
 from .baseline_unit import baseline_findings
 from .imu_spikes import NOUNS, spike_findings
 from .result import InertialDiagnosis

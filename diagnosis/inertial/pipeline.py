@@ -9,7 +9,7 @@ from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.wording import plural
 
-from ..conventions.rig_plausibility import usual_rig
+from ..conventions.extrinsics_check import usual_rig
 from ..conventions.units import Units, rescaled
 from ..inertial_initialization.inertial_path import InertialPath, inertial_path
 from ..inertial_initialization.initial_state import Start, inertial_start

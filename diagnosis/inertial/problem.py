@@ -13,7 +13,7 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray, HuberKernel, InputError
 
-from ..conventions.rig_plausibility import usual_rig
+from ..conventions.extrinsics_check import usual_rig
 from ..inertial_initialization.initial_state import Start
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..repairs.repaired_sequence import TrackRepairs, repaired_tracks, truth_of_landmarks

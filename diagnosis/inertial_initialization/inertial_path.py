@@ -10,7 +10,7 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3, strapdown
 
 from ..odometry.stereo_odometry import Odometry
-from ..robust_scale import CHI_SQUARE_MEDIAN
+from ..robust_constants import CHI_SQUARE_MEDIAN
 from .initial_state import Start, inflated, neighbors
 from .least_squares import Solution, solve_least_squares
 from .states import RelativePoses, States, motions_between

@@ -11,7 +11,7 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.geometry import FloatArray, so3, strapdown
 
-from ..robust_scale import MAD_TO_SIGMA
+from ..robust_constants import MAD_TO_SIGMA
 from .least_squares import ACCELEROMETER_BIAS_SIGMA, GYROSCOPE_BIAS_SIGMA
 from .states import Motions, RelativePoses, States, motions_between
 

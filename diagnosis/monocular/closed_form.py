@@ -15,7 +15,7 @@ from fgbaseline.geometry import FloatArray, so3, strapdown
 
 from ..inertial_initialization.least_squares import ACCELEROMETER_BIAS_SIGMA
 from ..inertial_initialization.states import Motions, States
-from ..robust_scale import MAD_TO_SIGMA
+from ..robust_constants import MAD_TO_SIGMA
 from .window_tracks import Rays
 
 ROUNDS = 5

@@ -11,7 +11,7 @@ from fgbaseline.geometry import FloatArray
 
 from ..inertial_initialization.least_squares import GYROSCOPE_BIAS_SIGMA
 from ..inertial_initialization.states import Motions
-from ..robust_scale import MAD_TO_SIGMA
+from ..robust_constants import MAD_TO_SIGMA
 from .window_tracks import Rays
 
 MIN_COMMON = 8

@@ -5,7 +5,7 @@ from dataclasses import replace
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 
-from ..conventions.rig_plausibility import unconfirmed_position
+from ..conventions.extrinsics_check import unconfirmed_position
 from ..inertial.imu_spikes import without_spikes
 from ..inertial.result import InertialDiagnosis
 from ..inertial.sensor_axes import in_imu_axes

@@ -9,7 +9,7 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
 from ..odometry.stereo_odometry import Odometry
-from ..robust_scale import CHI_SQUARE_MEDIAN, MAD_TO_SIGMA
+from ..robust_constants import CHI_SQUARE_MEDIAN, MAD_TO_SIGMA
 from ..window_adjustment.bundle_adjustment import CALIBRATION_PRIOR, WindowFit, fit_each_window
 from ..window_adjustment.residuals import N_CALIBRATION
 from ..window_adjustment.selection import spread_spans, unbroken_spans, windows_of

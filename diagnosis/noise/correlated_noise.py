@@ -14,7 +14,7 @@ from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3, so3
 
-from ..robust_scale import CHI_SQUARE_MEDIAN
+from ..robust_constants import CHI_SQUARE_MEDIAN
 from ..window_adjustment.bundle_adjustment import fit_each_window
 from ..window_adjustment.residuals import MISALIGNMENT, SCALE, Window, WindowData
 

@@ -14,7 +14,7 @@ import numpy as np
 from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.geometry import FloatArray, so3
 
-from ..robust_scale import CHI_SQUARE_MEDIAN
+from ..robust_constants import CHI_SQUARE_MEDIAN
 
 MIN_MATCHES = 12
 """smallest number of matches of a pair for its motion: twice the degrees of freedom, and some for wrong matches"""

@@ -14,7 +14,7 @@ from fgbaseline.data.observations import BoolArray, IntArray
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, StereoCamera, se3
 
-from ..robust_scale import CHI_SQUARE_MEDIAN
+from ..robust_constants import CHI_SQUARE_MEDIAN
 from ..tracks.track_segments import TrackSegments, track_segments
 from .ransac import TRUNCATION, best_hypotheses
 

@@ -8,14 +8,14 @@ from fgbaseline.data.axis_conventions import axes_matrix
 from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.geometry import InputError
 
+from ..body_velocity.pipeline import diagnose
+from ..body_velocity.result import Diagnosis
+from ..body_velocity.velocity_calibration import calibrate_with_axes
 from ..conventions.axes import Axes
 from ..noise.calibration_fit import CalibrationFit
 from ..noise.correlated_noise import Inflation
 from ..repairs.repaired_sequence import TrackRepairs
 from ..tracks.observation_mask import MaskSettings
-from ..velocity_diagnosis.pipeline import diagnose
-from ..velocity_diagnosis.result import Diagnosis
-from ..velocity_diagnosis.velocity_calibration import calibrate_with_axes
 from ..window_adjustment.residuals import MISALIGNMENT, N_CALIBRATION, OFFSET, SCALE
 from .settings import Repairs
 

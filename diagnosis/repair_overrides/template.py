@@ -7,11 +7,11 @@ import numpy as np
 from fgbaseline.data.problem import NoiseSettings
 from fgbaseline.geometry import FloatArray
 
+from ..body_velocity.result import Diagnosis
 from ..conventions.axes import Axes
 from ..repairs.repaired_sequence import repair
 from ..repairs.significance import significant_bias, significant_misalignment, significant_offset, significant_scale
 from ..tracks.observation_mask import MaskSettings
-from ..velocity_diagnosis.result import Diagnosis
 
 
 def repairs_text(diagnosis: Diagnosis) -> str:

@@ -14,6 +14,7 @@ from fgbaseline.data.velocity_increments import dead_reckoned_path, zero_order_h
 from fgbaseline.data.wording import signed, vector
 from fgbaseline.geometry import FloatArray, so3
 
+from ..body_velocity.result import Diagnosis
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..tracks.observation_mask import (
     GATE_RANGE,
@@ -24,7 +25,6 @@ from ..tracks.observation_mask import (
     split_tracks,
 )
 from ..tracks.track_segments import consecutive, is_usable
-from ..velocity_diagnosis.result import Diagnosis
 from .landmark_mask import exclude_landmarks
 from .significance import significant_bias, significant_misalignment, significant_offset, significant_scale
 

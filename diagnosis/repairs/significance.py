@@ -4,8 +4,8 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
+from ..body_velocity.result import Diagnosis
 from ..noise.calibration_fit import SIGNIFICANT
-from ..velocity_diagnosis.result import Diagnosis
 
 MIN_BIAS = 0.002
 """rad/s, largest component of a gyroscope bias below which it is not repaired"""

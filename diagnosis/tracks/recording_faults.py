@@ -6,7 +6,7 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray, disparity
 
-from .image_size import doubt_of_intrinsics
+from .intrinsics_check import doubt_of_intrinsics
 
 SWAPPED = 0.9
 """share of the disparities that are negative"""

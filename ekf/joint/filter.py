@@ -10,7 +10,6 @@ from fgbaseline.data.problem import Problem
 from fgbaseline.geometry import FloatArray, se3
 
 from ..motion_model import POSE, MotionModel, motion_model
-from .correction import correct
 from .feature_selection import select_features
 from .gating import GatedObservations, gate_observations
 from .gyro_bias import BiasedVelocityMotion
@@ -18,12 +17,13 @@ from .landmark_initialization import new_landmarks
 from .landmark_map import LandmarkMap
 from .landmark_representation import LandmarkRepresentation
 from .linearized_observations import LinearizedObservations, linearize
-from .one_camera.inverse_depth_prior import common_change
-from .one_camera.second_order import second_order, second_order_of
-from .one_camera.unknown_depths import MIN_COSINE, UnknownDepths, observed_depths
+from .monocular.inverse_depth_prior import common_change
+from .monocular.second_order import second_order, second_order_of
+from .monocular.unknown_depths import MIN_COSINE, UnknownDepths, observed_depths
 from .process_noise import MAX_REJECTED, ProcessNoise
 from .settings import JointSettings, Linearization
 from .state import ABSENT, JointState
+from .state_correction import correct
 from .unobservable_directions import first_estimate_transition
 from .update import CholeskyFactor, Innovation, NotPositiveDefiniteError, kalman_update
 

@@ -10,7 +10,7 @@ from fgbaseline.geometry.linearization import predict
 from fgbaseline.geometry.measurement_model import back_projected
 
 from .landmark_representation import chart, coordinates_of
-from .one_camera.inverse_depth_prior import inverse_depths, scene_depth
+from .monocular.inverse_depth_prior import inverse_depths, scene_depth
 from .settings import JointSettings, Linearization
 from .state import CommonError, JointState
 

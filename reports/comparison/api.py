@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from fgbaseline.compare.trajectory_comparison.settings import Delta, Settings
 from fgbaseline.data.formats.files.file_errors import FilePath, as_path
-from fgbaseline.data.formats.trajectories.opening import open_named
+from fgbaseline.data.formats.trajectories.format_detection import open_named
 from fgbaseline.geometry import InputError
 
 from ..python_interface import for_python

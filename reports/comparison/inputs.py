@@ -21,8 +21,8 @@ from fgbaseline.compare.trajectory_comparison.settings import Body, Settings
 from fgbaseline.data import Trajectory
 from fgbaseline.data.formats import ParsedTrajectory, read_landmarks, read_times
 from fgbaseline.data.formats.files.file_errors import FilePath
+from fgbaseline.data.formats.trajectories.format_detection import OpenedTrajectory, split_name
 from fgbaseline.data.formats.trajectories.kitti import read_extrinsic
-from fgbaseline.data.formats.trajectories.opening import OpenedTrajectory, split_name
 from fgbaseline.geometry import FloatArray, InputError, se3
 
 from ..run.defaults import names_in

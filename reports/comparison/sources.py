@@ -11,7 +11,7 @@ from fgbaseline.compare.trajectory_comparison.conventions import Source
 from fgbaseline.data import Estimate, Landmarks, Status, Trajectory, Truth
 from fgbaseline.data.formats import ParsedTrajectory, TrajectoryFormat
 from fgbaseline.data.formats.files.file_errors import FilePath
-from fgbaseline.data.formats.trajectories.opening import OpenedTrajectory, open_named, open_trajectory
+from fgbaseline.data.formats.trajectories.format_detection import OpenedTrajectory, open_named, open_trajectory
 from fgbaseline.data.formats.trajectories.reader import parsed_file
 from fgbaseline.geometry import InputError
 

@@ -1,7 +1,8 @@
 """Definitions of the metrics: where each stands in the results, and how tables, files and glossary show it.
 
 One `Metric` in `METRICS` adds a value to every table that its `tables` name. With `measure` it is a new key of an
-estimator in `summary.json` as well; a key of `comparison.json` is filled in `comparison_summary`. `metric_record` has the record, `glossary` the terms.
+estimator in `summary.json` as well; the keys of `comparison.json` are filled in `comparison_summary`. `metric_record`
+has the record, `glossary` the terms.
 """
 
 from collections.abc import Iterable

@@ -12,7 +12,7 @@ from fgbaseline.diagnosis import calibrated, diagnose
 def test_a_failed_diagnosis_is_reported_and_the_recording_is_used_as_recorded(
     monkeypatch: pytest.MonkeyPatch, error: Exception
 ) -> None:
-    module = importlib.import_module("fgbaseline.diagnosis.velocity_diagnosis.pipeline")
+    module = importlib.import_module("fgbaseline.diagnosis.body_velocity.pipeline")
 
     def breaks(_: data.Sequence) -> None:
         raise error

@@ -9,7 +9,7 @@ import pytest
 
 from fgbaseline import data, diagnosis
 from fgbaseline.data import Estimate, Observations, Problem, Sequence
-from fgbaseline.diagnosis.held_out import MIN_PIECE
+from fgbaseline.diagnosis.track_holdout import MIN_PIECE
 from fgbaseline.ekf import dead_reckoning, ekf, joint_ekf
 from fgbaseline.geometry import FloatArray, InputError
 from fgbaseline.smoother import isam2

@@ -3,7 +3,7 @@
 import pytest
 from scipy.stats import chi2
 
-from fgbaseline.diagnosis.robust_scale import CHI_SQUARE_MEDIAN, MAD_TO_SIGMA
+from fgbaseline.diagnosis.robust_constants import CHI_SQUARE_MEDIAN, MAD_TO_SIGMA
 
 
 def test_medians_are_those_of_chi_square():

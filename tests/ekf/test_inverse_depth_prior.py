@@ -10,7 +10,7 @@ from fgbaseline.data.problem import InverseDepthPrior
 from fgbaseline.ekf.joint import estimators
 from fgbaseline.ekf.joint.filter import JointFilter
 from fgbaseline.ekf.joint.landmark_representation import LandmarkRepresentation, chart
-from fgbaseline.ekf.joint.one_camera.inverse_depth_prior import inverse_depths, scene_depth
+from fgbaseline.ekf.joint.monocular.inverse_depth_prior import inverse_depths, scene_depth
 from fgbaseline.ekf.joint.settings import JointSettings
 from fgbaseline.geometry import FloatArray, se3
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fgbaseline.ekf.joint.landmark_representation import LandmarkRepresentation, chart, homogeneous
-from fgbaseline.ekf.joint.one_camera.second_order import second_order
+from fgbaseline.ekf.joint.monocular.second_order import second_order
 from fgbaseline.geometry import FloatArray, MonocularCamera, se3
 from fgbaseline.geometry.linearization import predict
 

@@ -7,7 +7,7 @@ from fgbaseline import ekf, smoother
 from fgbaseline.data import Estimate, Problem
 from fgbaseline.ekf.joint.filter import JointFilter
 from fgbaseline.ekf.joint.gating import GatedObservations
-from fgbaseline.ekf.joint.one_camera.unknown_depths import observed_depths
+from fgbaseline.ekf.joint.monocular.unknown_depths import observed_depths
 from fgbaseline.ekf.joint.settings import JointSettings
 from fgbaseline.ekf.joint.state import JointState
 from fgbaseline.geometry import FloatArray, se3, so3, strapdown

@@ -1,4 +1,4 @@
-"""`write_npz`: a recording in our own npz (the keys are listed in `npz_reader`), the same bytes for the same recording."""
+"""`write_npz`: a recording in our own npz (keys: `npz_reader`), the same bytes for the same recording."""
 
 import zipfile
 from collections.abc import Iterator

@@ -18,7 +18,7 @@ from ..inertial.imu_yaml import NO_CALIBRATION, calibration_or_assumed
 from ..inertial.velocity_csv import read_velocity_csv
 from ..trajectories.kitti import read_extrinsic
 from .ground_truth import BodyFrame, attach_truth
-from .ucsd_ece276a import NO_VELOCITIES, read_course
+from .npz_reader import NO_VELOCITIES, read_course
 from .utias import read_utias
 
 ZIP = (b"PK\x03\x04", b"PK\x05\x06")

@@ -16,8 +16,7 @@ from ..files.file_errors import FilePath, reading
 from ..stamps.file_stamps import possible_units, stamps_of
 from .bag_topic import read_bag_trajectory
 from .columns import Order
-from .npz import read_trajectory_npz
-from .opening import (
+from .format_detection import (
     OpenedTrajectory,
     TrajectoryArchive,
     TrajectoryFormat,
@@ -25,6 +24,7 @@ from .opening import (
     TrajectoryTopic,
     open_trajectory,
 )
+from .npz import read_trajectory_npz
 from .parsed_trajectory import ParsedTrajectory, unit_and_order
 from .text_parser import parse_text
 

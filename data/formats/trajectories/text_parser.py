@@ -11,7 +11,7 @@ from ..files.number_table import Lines
 from ..stamps.file_stamps import equal_stamps, possible_units, stamps_of
 from .checks import poses_of_matrices, require_rising, rotations_of_quaternions
 from .columns import METERS, Columns
-from .opening import TrajectoryText
+from .format_detection import TrajectoryText
 from .parsed_trajectory import ParsedTrajectory
 from .quaternion_order import xyzw
 

@@ -11,10 +11,10 @@ from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import se3
 
 from ..conventions.axes import ENOUGH
-from ..conventions.rig_plausibility import doubt_of_position, extrinsic_unit, usual_rig
+from ..conventions.extrinsics_check import doubt_of_position, extrinsic_unit, usual_rig
 from ..conventions.units import Units, rescaled, units_of
 from ..odometry.stereo_odometry import Odometry, odometry
-from ..tracks.image_size import doubt_of_intrinsics
+from ..tracks.intrinsics_check import doubt_of_intrinsics
 from ..tracks.recording_faults import unusable
 from .result import Diagnosis
 from .velocity_calibration import calibrate_velocities

@@ -5,7 +5,7 @@ import numpy as np
 from fgbaseline.geometry import FloatArray, se3, so3
 
 from ..motion_model import POSE
-from .one_camera.unknown_depths import UnknownDepths
+from .monocular.unknown_depths import UnknownDepths
 from .settings import Linearization
 from .state import JointState
 from .unobservable_directions import transform_columns
