@@ -21,8 +21,8 @@ from rich.table import Table
 
 from fgbaseline.data import Problem, Sequence, Status, find_estimator
 from fgbaseline.geometry import FgbaselineError
-from fgbaseline.reports.run.problem import build_problem, read_sequence
-from fgbaseline.reports.run.settings import RunSettings, check_estimators
+from fgbaseline.reports.problem.construction import build_problem, read_sequence
+from fgbaseline.reports.problem.settings import RunSettings, check_estimators
 
 
 def seconds_taken(problem: Problem, name: str) -> float:

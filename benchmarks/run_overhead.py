@@ -27,7 +27,7 @@ import click
 
 from benchmarks.claim_table import Row, table
 from fgbaseline.reports.cli import NEW_OBJECTS
-from fgbaseline.reports.run.defaults import DEFAULT_ESTIMATORS
+from fgbaseline.reports.problem.defaults import DEFAULT_ESTIMATORS
 
 WANTED = 8.0
 """s, of all that is not an estimator"""
@@ -50,8 +50,8 @@ def stages(recording: Path, estimators: tuple[str, ...]) -> dict[str, float]:
     with watch("imports"):
         from fgbaseline.data.parallel import background_map, cores
         from fgbaseline.reports import progress  # noqa: F401
-        from fgbaseline.reports.run.problem import build_problem, read_sequence
-        from fgbaseline.reports.run.settings import RunSettings, import_estimators
+        from fgbaseline.reports.problem.construction import build_problem, read_sequence
+        from fgbaseline.reports.problem.settings import RunSettings, import_estimators
     settings = RunSettings(sequence=recording, estimators=estimators)
     with watch("reading"):
         sequence = read_sequence(settings)

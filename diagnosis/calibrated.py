@@ -16,10 +16,10 @@ from .body_velocity.pipeline import diagnose
 from .body_velocity.result import Diagnosis
 from .findings.track_statistics import track_statistics
 from .findings.velocity_findings import findings_of, rescalings
+from .inertial.monocular.problem import as_recorded_monocular, monocular_problem
 from .inertial.pipeline import diagnose_inertial
 from .inertial.problem import as_recorded_inertial, inertial_problem
 from .inertial.result import InertialDiagnosis
-from .monocular.problem import as_recorded_monocular, monocular_problem
 from .repair_overrides.applied_overrides import mask_settings, override_sentences, with_given_units, with_overrides
 from .repair_overrides.settings import Repairs
 from .repairs.repaired_sequence import repair

@@ -12,12 +12,12 @@ from fgbaseline.data.wording import capitalized, plural
 from ..body_velocity.result import Diagnosis
 from ..findings.track_findings import track_findings
 from ..findings.track_statistics import TrackStatistics, track_statistics
-from ..monocular.initial_state import EXCITED, MonocularStart
 from ..repairs.repaired_sequence import Repaired, RepairedTracks, TrackRepairs, repaired_tracks
 from ..tracks.intrinsics_check import intrinsics_findings
 from ..tracks.observation_mask import MaskSettings
 from .baseline_unit import baseline_findings
 from .imu_spikes import NOUNS, spike_findings
+from .monocular.initial_state import EXCITED, MonocularStart
 from .result import InertialDiagnosis
 from .sensor_axes import axes_findings
 from .sensor_findings import sensor_findings

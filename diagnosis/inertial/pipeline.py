@@ -13,13 +13,13 @@ from ..conventions.extrinsics_check import usual_rig
 from ..conventions.units import Units, rescaled
 from ..inertial_initialization.inertial_path import InertialPath, inertial_path
 from ..inertial_initialization.initial_state import Start, inertial_start
-from ..monocular.pipeline import diagnose_monocular
 from ..noise.calibration_fit import fit_windows
 from ..odometry.stereo_odometry import Odometry, odometry
 from ..tracks.recording_faults import unusable
 from ..tracks.track_segments import repeated
 from .baseline_unit import baseline_unit
 from .imu_spikes import without_spikes
+from .monocular.pipeline import diagnose_monocular
 from .result import InertialDiagnosis
 from .sensor_axes import in_imu_axes, sensor_axes
 from .sensor_calibration import sensor_checks

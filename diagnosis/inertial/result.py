@@ -12,12 +12,12 @@ from fgbaseline.data.sequence import Sequence
 
 from ..inertial_initialization.inertial_path import InertialPath
 from ..inertial_initialization.initial_state import Start
-from ..monocular.initial_state import MonocularStart
 from ..noise.calibration_fit import CalibrationFit
 from ..odometry.stereo_odometry import Odometry
 from ..repairs.repaired_sequence import RepairedTracks
 from .baseline_unit import BaselineUnit
 from .imu_spikes import Spikes
+from .monocular.initial_state import MonocularStart
 from .sensor_axes import SensorAxes
 from .sensor_calibration import SensorChecks
 from .units import ImuUnits

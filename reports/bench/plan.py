@@ -13,8 +13,8 @@ from fgbaseline.data.simulate import Simulation
 from fgbaseline.diagnosis import read_repairs
 from fgbaseline.geometry import InputError
 
+from ..problem.settings import check_estimators
 from ..results.bench import File, Job, Planned, Recorded, Simulated
-from ..run.settings import check_estimators
 from .suite import DriveError, Entry, Suite, drives, several
 from .worker import code_hash, file_hash
 

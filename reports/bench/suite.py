@@ -15,8 +15,8 @@ from fgbaseline.data.simulate import Simulation
 from fgbaseline.diagnosis.repair_overrides.settings import SigmaOverrides
 from fgbaseline.geometry import InputError
 
+from ..problem.settings import RunSettings
 from ..results.parts import Finite, Part
-from ..run.settings import RunSettings
 
 Page: TypeAlias = Literal["none", "tables", "figures"]
 Preset: TypeAlias = Literal["calibrated", "documented"]

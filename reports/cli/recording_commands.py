@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from ..run.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
+from ..problem.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
 from . import options
 from .options import PATH
 
@@ -96,8 +96,8 @@ def run(
     from fgbaseline.data import LandmarkMode, TimeUnit
     from fgbaseline.data.estimators.user_estimator import load_all
 
+    from ..problem.settings import RunSettings
     from ..run.command import run as run_and_report
-    from ..run.settings import RunSettings
 
     functions = load_all(user_estimators)
     names = DEFAULT_ESTIMATORS if estimators is None else names_in(estimators)
@@ -128,7 +128,7 @@ def track(source: Path, out: Path, force: bool, tracker: Path | None, **given: A
     """
     from fgbaseline.data.tracking import ImageOptions
 
-    from ..run.images import write_tracks
+    from ..problem.images import write_tracks
 
     return write_tracks(source, out, ImageOptions(**given), tracker, force=force)
 
@@ -179,9 +179,9 @@ def diagnose(
     """
     from fgbaseline.data import TimeUnit
 
+    from ..problem.construction import read_sequence
+    from ..problem.settings import RunSettings
     from ..run.diagnose import print_diagnosis
-    from ..run.problem import read_sequence
-    from ..run.settings import RunSettings
 
     unit = None if time_unit is None else TimeUnit(time_unit)
     recording = read_sequence(RunSettings(sequence=sequence, time_unit=unit, **given))
@@ -208,7 +208,7 @@ def export(out: Path, force: bool, **given: Any) -> int:
 
     Exits 0, or 2 on bad input.
     """
+    from ..problem.settings import RunSettings
     from ..run.command import export as export_problem
-    from ..run.settings import RunSettings
 
     return export_problem(RunSettings(**given), out, force=force)

@@ -12,10 +12,10 @@ from fgbaseline.data import HeldOut, LandmarkMode, Landmarks, Problem, Sequence,
 from fgbaseline.data.formats.files.file_errors import reading
 from fgbaseline.geometry import InputError
 
+from ..problem.construction import build_problem, hold_out_tracks
+from ..problem.settings import RunSettings
 from ..results.json_files import SUMMARY
 from ..results.reader import RunFolder
-from ..run.problem import build_problem, hold_out_tracks
-from ..run.settings import RunSettings
 
 NO_REFERENCE = "the run has no reference: none of its estimators succeeded; repeat the run"
 

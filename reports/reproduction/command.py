@@ -19,7 +19,6 @@ from fgbaseline.data.wording import plural
 from fgbaseline.geometry import InputError
 
 from ..figures import save
-from ..figures.reproduction import draw
 from ..formatting import meters, number, per_cent
 from ..html.page import Block, Grid, Note, Page, Pair, Section, pictures, render_page
 from ..progress import reporter
@@ -28,6 +27,7 @@ from ..tables.table import Column, Row, Table, numbers, words
 from ..tables.writers import print_table
 from .claims import Claim, Verdict, claims_of, missing_claims
 from .experiments import Outcome, Study, SweepSettings, stages_of, study_recording
+from .figures import draw
 from .recordings import read_subjects
 
 MARK = "claims.json"

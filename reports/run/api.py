@@ -25,15 +25,15 @@ from fgbaseline.data.formats.files.file_errors import FilePath, as_path
 
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
 from ..phrases.run import verdict
+from ..problem.construction import build_problem, hold_out_tracks, read_sequence
+from ..problem.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
+from ..problem.settings import RunSettings, Solver, check_estimators, import_estimators, named_estimators, with_defaults
 from ..python_interface import NotebookResult, for_python, write_report
 from ..results.json_files import SUMMARY
 from ..results.run import Summary, summarize
 from ..tables.run import main_frame, main_table, metrics_table
 from ..tables.table import Table
-from .defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
 from .estimation import read_added, solve
-from .problem import build_problem, hold_out_tracks, read_sequence
-from .settings import RunSettings, Solver, check_estimators, import_estimators, named_estimators, with_defaults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,9 +12,9 @@ from fgbaseline.data.tracking import Pictures
 from fgbaseline.data.wording import plural
 
 from ..open_page import announce, print_sentences
+from ..problem.construction import TRACKS, build_problem, hold_out_tracks, preliminary_remarks, read_sequence
+from ..problem.settings import RunSettings, check_estimators, import_estimators, with_defaults
 from ..results.json_files import SUMMARY
-from .problem import TRACKS, build_problem, hold_out_tracks, preliminary_remarks, read_sequence
-from .settings import RunSettings, check_estimators, import_estimators, with_defaults
 
 FAILED = 1
 UNWRAPPED = 120

@@ -19,7 +19,7 @@ from fgbaseline.geometry import InputError
 
 from ..comparison.inputs import in_one_body, valid_file_name
 from ..comparison.sources import opened
-from .settings import RunSettings
+from ..problem.settings import RunSettings
 
 LEVEL = 1.0
 """largest angle between the ups of two level worlds, deg; beyond it a yaw alignment would leave a tilt as error"""

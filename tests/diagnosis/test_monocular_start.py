@@ -13,10 +13,10 @@ from fgbaseline.data.problem import Excluded
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.simulate import SimulatedImu, Simulation, simulate
 from fgbaseline.diagnosis import AsRecordedSettings
+from fgbaseline.diagnosis.inertial.monocular.gyroscope_bias import epipolar_bias
+from fgbaseline.diagnosis.inertial.monocular.initial_state import MonocularStart, monocular_start
+from fgbaseline.diagnosis.inertial.monocular.window_tracks import keyframe_tracks, rays_of
 from fgbaseline.diagnosis.inertial_initialization.states import motions_between
-from fgbaseline.diagnosis.monocular.gyroscope_bias import epipolar_bias
-from fgbaseline.diagnosis.monocular.initial_state import MonocularStart, monocular_start
-from fgbaseline.diagnosis.monocular.window_tracks import keyframe_tracks, rays_of
 from fgbaseline.geometry import InputError
 
 from ..builders.inertial import simulated_problem

@@ -23,8 +23,8 @@ from fgbaseline.diagnosis import Diagnosis, Repairs, calibrated, diagnose, findi
 from fgbaseline.diagnosis.conventions.rate_units import COUNTS
 from fgbaseline.diagnosis.repair_overrides.settings import UnitOverrides
 from fgbaseline.geometry import InputError, se3, so3
-from fgbaseline.reports.run.problem import build_problem
-from fgbaseline.reports.run.settings import RunSettings
+from fgbaseline.reports.problem.construction import build_problem
+from fgbaseline.reports.problem.settings import RunSettings
 
 from ..builders.commands import fgbaseline
 from .test_real_recordings import UTIAS

@@ -10,7 +10,7 @@ import pytest
 from fgbaseline import data, diagnosis, ekf, smoother
 from fgbaseline.data import Observations, Problem, Sequence, Status
 from fgbaseline.data.problem.inertial import imu_intervals
-from fgbaseline.diagnosis.monocular import initialization_window
+from fgbaseline.diagnosis.inertial.monocular import initialization_window
 from fgbaseline.geometry.monocular_camera import left_of
 
 from .test_one_camera_real import errors

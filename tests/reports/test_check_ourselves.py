@@ -17,10 +17,10 @@ from fgbaseline.ekf import decoupled_ekf
 from fgbaseline.ekf.pose_update import PoseInnovation
 from fgbaseline.geometry import StereoCamera
 from fgbaseline.geometry.linearization import Prediction
+from fgbaseline.reports.problem.construction import build_problem
+from fgbaseline.reports.problem.settings import RunSettings
 from fgbaseline.reports.results.json_files import SUMMARY
 from fgbaseline.reports.results.run import summarize
-from fgbaseline.reports.run.problem import build_problem
-from fgbaseline.reports.run.settings import RunSettings
 
 from ..builders.commands import fgbaseline
 from ..builders.summaries import check_files

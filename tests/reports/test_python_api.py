@@ -23,9 +23,9 @@ from fgbaseline.data.problem_export import write_problem
 from fgbaseline.geometry import InputError, se3
 from fgbaseline.reports.cli import COMMANDS
 from fgbaseline.reports.comparison import ComparisonReport
+from fgbaseline.reports.problem.defaults import DEFAULT_ESTIMATORS
 from fgbaseline.reports.python_interface import in_python
 from fgbaseline.reports.run.api import RunReport, named_estimators
-from fgbaseline.reports.run.defaults import DEFAULT_ESTIMATORS
 
 from ..builders.commands import everything_in
 from ..builders.commands import fgbaseline as command

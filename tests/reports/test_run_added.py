@@ -13,10 +13,10 @@ from fgbaseline.data.estimators.user_estimator import load_all
 from fgbaseline.data.simulate import Simulation, simulate
 from fgbaseline.geometry import FloatArray, InputError, se3
 from fgbaseline.reports.comparison import compare
+from fgbaseline.reports.problem.construction import build_problem
+from fgbaseline.reports.problem.settings import RunSettings
 from fgbaseline.reports.run.estimation import read_added, solve
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import build_problem
-from fgbaseline.reports.run.settings import RunSettings
 
 from ..builders.browser import Opened
 

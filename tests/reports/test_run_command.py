@@ -17,11 +17,11 @@ import pytest
 
 from fgbaseline import data
 from fgbaseline.geometry import InputError
+from fgbaseline.reports.problem.construction import build_problem, read_sequence
+from fgbaseline.reports.problem.settings import RunSettings
 from fgbaseline.reports.results.run import summarize
 from fgbaseline.reports.run.estimation import solve
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import build_problem, read_sequence
-from fgbaseline.reports.run.settings import RunSettings
 
 from ..builders.commands import COMMAND, environment, everything_in, fgbaseline, heeding_interrupts, started
 

@@ -17,11 +17,11 @@ from fgbaseline.geometry import InputError
 from fgbaseline.reports import figures
 from fgbaseline.reports.html.run_page import render
 from fgbaseline.reports.phrases.run import verdict
+from fgbaseline.reports.problem.construction import hold_out_tracks
+from fgbaseline.reports.problem.settings import RunSettings
 from fgbaseline.reports.results.evidence import frame_ranges
 from fgbaseline.reports.run.estimation import solve
 from fgbaseline.reports.run.folder import write_run
-from fgbaseline.reports.run.problem import hold_out_tracks
-from fgbaseline.reports.run.settings import RunSettings
 
 from ..builders.commands import fgbaseline
 from ..builders.empty_figures import figures_left_empty

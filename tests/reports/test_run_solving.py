@@ -14,9 +14,9 @@ from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress,
 from fgbaseline.data.estimators import runner as estimator_runner
 from fgbaseline.data.estimators.runner import solve_all
 from fgbaseline.geometry import InputError
+from fgbaseline.reports.problem.construction import read_sequence
+from fgbaseline.reports.problem.settings import RunSettings, check_estimators
 from fgbaseline.reports.run.estimation import batch_is_added, solve
-from fgbaseline.reports.run.problem import read_sequence
-from fgbaseline.reports.run.settings import RunSettings, check_estimators
 
 from ..builders.runs import as_dict
 from ..builders.synthetic import Scene, plain_problem
@@ -218,7 +218,7 @@ def test_estimators_are_checked_before_anything_runs(names: tuple[str, ...], mes
 
 @pytest.mark.parametrize("name", ["a/b", "..", ".hidden", "c\\d"])
 def test_an_impossible_file_name_is_refused(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-    monkeypatch.setattr("fgbaseline.reports.run.settings.estimator_names", lambda: [name])
+    monkeypatch.setattr("fgbaseline.reports.problem.settings.estimator_names", lambda: [name])
     with pytest.raises(InputError, match="cannot be a file name"):
         check_estimators((name,))
 

@@ -5,15 +5,15 @@ from dataclasses import replace
 from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 
-from ..conventions.extrinsics_check import unconfirmed_position
-from ..inertial.imu_spikes import without_spikes
-from ..inertial.result import InertialDiagnosis
-from ..inertial.sensor_axes import in_imu_axes
-from ..inertial.sensor_calibration import sensor_checks
-from ..inertial.units import imu_units, rescaled_samples
-from ..odometry.monocular_odometry import monocular_odometry
-from ..tracks.recording_faults import unusable
-from ..tracks.track_segments import repeated
+from ...conventions.extrinsics_check import unconfirmed_position
+from ...odometry.monocular_odometry import monocular_odometry
+from ...tracks.recording_faults import unusable
+from ...tracks.track_segments import repeated
+from ..imu_spikes import without_spikes
+from ..result import InertialDiagnosis
+from ..sensor_axes import in_imu_axes
+from ..sensor_calibration import sensor_checks
+from ..units import imu_units, rescaled_samples
 from .initial_state import monocular_start
 from .sensor_axes import monocular_axes
 from .track_mask import monocular_tracks, used

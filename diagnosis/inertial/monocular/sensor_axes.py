@@ -15,11 +15,11 @@ from fgbaseline.data.problem.inertial import ImuIntervals, imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
-from ..conventions.axes import angular_axes
-from ..inertial.sensor_axes import MIN_INTERVALS, SensorAxes, in_imu_axes
-from ..inertial.units import mean_rates
-from ..inertial_initialization.structureless_factors import KeyframeTracks
-from ..odometry.stereo_odometry import Odometry
+from ...conventions.axes import angular_axes
+from ...inertial_initialization.structureless_factors import KeyframeTracks
+from ...odometry.stereo_odometry import Odometry
+from ..sensor_axes import MIN_INTERVALS, SensorAxes, in_imu_axes
+from ..units import mean_rates
 from .initialization_window import FIRST_PIXEL, gyroscope_biases, spread_keyframes, states_at
 from .window_tracks import keyframe_tracks, squared_residuals, window_points
 

@@ -15,10 +15,10 @@ from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, se3
 
-from ..inertial_initialization.initial_state import NO_POSES, Start, standing_states, start_of
-from ..inertial_initialization.least_squares import solve_least_squares
-from ..inertial_initialization.states import RelativePoses
-from ..inertial_initialization.stationary import keyframes_of, standing_frames, stands
+from ...inertial_initialization.initial_state import NO_POSES, Start, standing_states, start_of
+from ...inertial_initialization.least_squares import solve_least_squares
+from ...inertial_initialization.states import RelativePoses
+from ...inertial_initialization.stationary import keyframes_of, standing_frames, stands
 from .initialization_window import Rest, Window, moving_window
 from .window_tracks import every_second_track
 

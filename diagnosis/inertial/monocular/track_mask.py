@@ -13,11 +13,11 @@ from fgbaseline.data.problem import Excluded
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray
 
-from ..odometry.epipolar_motion import beyond_scene, epipolar_motions
-from ..odometry.monocular_odometry import ray_matches, track_pairs
-from ..repairs.repaired_sequence import RepairedTracks, renumbered_tracks, truth_of_landmarks
-from ..tracks.observation_mask import MaskSettings, prediction_gate, split_tracks
-from ..tracks.track_segments import consecutive
+from ...odometry.epipolar_motion import beyond_scene, epipolar_motions
+from ...odometry.monocular_odometry import ray_matches, track_pairs
+from ...repairs.repaired_sequence import RepairedTracks, renumbered_tracks, truth_of_landmarks
+from ...tracks.observation_mask import MaskSettings, prediction_gate, split_tracks
+from ...tracks.track_segments import consecutive
 
 STEPS = (1, 2, 3)
 """frames between compared observations: more than one, so that a track survives a single wrong match"""

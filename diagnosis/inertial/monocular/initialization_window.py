@@ -13,11 +13,11 @@ from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import FloatArray, strapdown
 
-from ..inertial_initialization.initial_state import NO_POSES, Start
-from ..inertial_initialization.least_squares import Solution, solve_least_squares
-from ..inertial_initialization.states import RelativePoses, States, motions_between
-from ..inertial_initialization.structureless_factors import KeyframeTracks
-from ..robust_constants import CHI_SQUARE_MEDIAN
+from ...inertial_initialization.initial_state import NO_POSES, Start
+from ...inertial_initialization.least_squares import Solution, solve_least_squares
+from ...inertial_initialization.states import RelativePoses, States, motions_between
+from ...inertial_initialization.structureless_factors import KeyframeTracks
+from ...robust_constants import CHI_SQUARE_MEDIAN
 from .closed_form import closed_form
 from .gyroscope_bias import epipolar_bias
 from .window_tracks import first_inverse_depths, keyframe_tracks, rays_of, squared_residuals, window_points

@@ -10,14 +10,14 @@ from fgbaseline.data.problem.inertial import imu_intervals
 from fgbaseline.data.sequence import Sequence
 from fgbaseline.geometry import HuberKernel, InputError
 
-from ..conventions.extrinsics_check import unconfirmed_position
-from ..inertial.findings import inertial_findings, inertial_repairs, scale_findings
-from ..inertial.problem import imu_remarks, problem_of
-from ..inertial.result import InertialDiagnosis
-from ..inertial.units import imu_unit_findings, imu_units, require_si
-from ..odometry.monocular_odometry import monocular_odometry
-from ..tracks.intrinsics_check import intrinsics_findings
-from ..tracks.recording_faults import unusable
+from ...conventions.extrinsics_check import unconfirmed_position
+from ...odometry.monocular_odometry import monocular_odometry
+from ...tracks.intrinsics_check import intrinsics_findings
+from ...tracks.recording_faults import unusable
+from ..findings import inertial_findings, inertial_repairs, scale_findings
+from ..problem import imu_remarks, problem_of
+from ..result import InertialDiagnosis
+from ..units import imu_unit_findings, imu_units, require_si
 from .initial_state import monocular_start
 from .track_mask import repaired
 

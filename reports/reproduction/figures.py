@@ -20,11 +20,11 @@ from fgbaseline.data.wording import plural
 from fgbaseline.geometry import FloatArray
 from fgbaseline.geometry.path_length import path_length
 
+from ..figures.drawing import DrawOne, drawn
+from ..figures.layout import title_and_legend
+from ..figures.panels import Window, common_window, frame_top_view, known, note, robust_window, swatch
+from ..figures.style import SCREEN, safe_text
 from ..formatting import meters
-from .drawing import DrawOne, drawn
-from .layout import title_and_legend
-from .panels import Window, common_window, frame_top_view, known, note, robust_window, swatch
-from .style import SCREEN, safe_text
 
 if TYPE_CHECKING:
     from fgbaseline.reports.reproduction.experiments import Outcome, Study

@@ -10,7 +10,7 @@ from fgbaseline.geometry import FloatArray, HuberKernel, MeasurementModel, se3
 from fgbaseline.geometry.linearization import predict
 from fgbaseline.geometry.triangulation import triangulate_tracks
 
-from ..inertial_initialization.structureless_factors import KeyframeTracks
+from ...inertial_initialization.structureless_factors import KeyframeTracks
 
 MIN_OBSERVATIONS = 3
 """observations of a track among the keyframes"""

@@ -13,9 +13,9 @@ from fgbaseline.data.observations import BoolArray
 from fgbaseline.data.problem.inertial import ImuIntervals
 from fgbaseline.geometry import FloatArray, so3, strapdown
 
-from ..inertial_initialization.least_squares import ACCELEROMETER_BIAS_SIGMA
-from ..inertial_initialization.states import Motions, States
-from ..robust_constants import MAD_TO_SIGMA
+from ...inertial_initialization.least_squares import ACCELEROMETER_BIAS_SIGMA
+from ...inertial_initialization.states import Motions, States
+from ...robust_constants import MAD_TO_SIGMA
 from .window_tracks import Rays
 
 ROUNDS = 5

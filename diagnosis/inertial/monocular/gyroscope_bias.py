@@ -9,9 +9,9 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
-from ..inertial_initialization.least_squares import GYROSCOPE_BIAS_SIGMA
-from ..inertial_initialization.states import Motions
-from ..robust_constants import MAD_TO_SIGMA
+from ...inertial_initialization.least_squares import GYROSCOPE_BIAS_SIGMA
+from ...inertial_initialization.states import Motions
+from ...robust_constants import MAD_TO_SIGMA
 from .window_tracks import Rays
 
 MIN_COMMON = 8
