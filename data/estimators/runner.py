@@ -11,8 +11,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from fgbaseline.data import Estimate, Problem, Progress, Status, find_estimator
 from fgbaseline.geometry import FgbaselineError, so3
+
+from ..problem import Problem
+from .estimate import Estimate, Progress, Status
+from .registry import find_estimator
 
 Watch: TypeAlias = Callable[[str], AbstractContextManager[Progress | None]]
 """context manager around the run of a named estimator, which gives its progress callback"""
