@@ -1,7 +1,9 @@
 """Language of code and docs: American spelling, and docstrings that start with their subject."""
 
 import ast
+import io
 import re
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +18,12 @@ BRITISH = re.compile(
 )
 SHAPE = re.compile(r"\([\w+\- ]+,[^)]*\)")
 PERSONS = re.compile(r"\b(who|whoever|nobody|somebody|told|tells?)\b(?! cannot)", re.IGNORECASE)
+
+
+ELSEWHERE = {"scipy.io.loadmat", "Axes.boxplot", "stereo_calib", "p_rs_r_x", "fgbaseline."}
+"""names of other programs, and beginnings of names"""
+COMPOSED = re.compile(r"_[TR]_|_NAME$|_\d+$|^(true|truth|divergence)_|^velocity_x$|_\.*$")
+"""transforms, and names of which a part is filled in"""
 
 
 def sources() -> list[Path]:
@@ -90,5 +98,28 @@ def test_the_first_paragraph_of_a_docstring_is_a_sentence_that_begins_with_words
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
         for text in [(ast.get_docstring(node) or "").split("\n\n")[0].strip()]
         if text and "tests" not in path.parts and (text[-1] not in ".:?" or SHAPE.match(text))
+    ]
+    assert not found
+
+
+def test_names_in_docstrings_exist() -> None:
+    """As a name, a part of a string, a module or a folder: what is renamed is renamed in docstrings too."""
+    known: set[str] = set()
+    for path in sources():
+        known.update(path.relative_to(ROOT).with_suffix("").parts)
+        text = path.read_text(encoding="utf-8")
+        documenting = {line for line, _ in strings_that_document(path)}
+        for token in tokenize.generate_tokens(io.StringIO(text).readline):
+            if token.type == tokenize.NAME:
+                known.add(token.string)
+            elif token.type == tokenize.STRING and token.start[0] not in documenting:
+                known.update(re.findall(r"\w+", token.string))
+    found = [
+        f"{path.relative_to(ROOT)}:{line}: {name}"
+        for path in sources()
+        if "tests" not in path.parts
+        for line, text in strings_that_document(path)
+        for name in re.findall(r"`([A-Za-z_][\w.]*)`", text)
+        if name.rpartition(".")[2] not in known and name not in ELSEWHERE and not COMPOSED.search(name)
     ]
     assert not found
