@@ -35,10 +35,10 @@ class DivergenceOnset:
 
 def divergence_threshold(result: "Result") -> float:
     """Divergence threshold, m: 1 % of the length of the reference path, at most 5 m; 5 m without a path."""
-    return min(FAR, FAR_SHARE * path_length(result)) or FAR
+    return min(FAR, FAR_SHARE * reference_path_length(result)) or FAR
 
 
-def path_length(result: "Result") -> float:
+def reference_path_length(result: "Result") -> float:
     """Length of the reference's path, m."""
     return 0.0 if result.divergence is None else float(np.nanmax(result.divergence["traveled"].to_numpy()))
 

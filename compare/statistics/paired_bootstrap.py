@@ -95,12 +95,14 @@ class PairedRanking:
     """RMSE of each but the first minus that of the first; value >= 0 where both are finite"""
     moments: int
     """number of stamps at which all of them have an error"""
-    errors: Mapping[str, FloatArray] = field(default_factory=dict, repr=False, compare=False)
+    errors: Mapping[str, FloatArray] = field(repr=False, compare=False)
     """(moments,) by name, in that order"""
+    seed: int
+    """of the bootstrap"""
 
     def difference(self, name: str, other: str) -> RmseDifference:
         """RMSE of one minus that of another, over the stamps at which all of them have an error."""
-        return rmse_difference(self.errors[name], self.errors[other])
+        return rmse_difference(self.errors[name], self.errors[other], seed=self.seed)
 
 
 def paired_ranking(errors: Mapping[str, ArrayLike], *, seed: int = 0) -> PairedRanking:
@@ -116,9 +118,9 @@ def paired_ranking(errors: Mapping[str, ArrayLike], *, seed: int = 0) -> PairedR
     everywhere = ~np.any([np.isnan(column) for column in columns.values()], axis=0)
     common = {name: column[everywhere] for name, column in columns.items()} if columns else {}
     if not any(len(column) for column in common.values()):
-        return PairedRanking({}, {}, 0)
+        return PairedRanking({}, {}, 0, {}, seed)
     rmse = {name: float(np.sqrt(np.mean(column**2))) for name, column in common.items()}
     order = sorted(rmse, key=lambda name: rmse[name])
     common = {name: common[name] for name in order}
     behind = {name: rmse_difference(common[name], common[order[0]], seed=seed) for name in order[1:]}
-    return PairedRanking({name: rmse[name] for name in order}, behind, int(np.sum(everywhere)), common)
+    return PairedRanking({name: rmse[name] for name in order}, behind, int(np.sum(everywhere)), common, seed)

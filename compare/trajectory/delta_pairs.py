@@ -47,6 +47,8 @@ def pose_pairs(
         raise InputError(f"delta: expected {wanted} of {unit.value}, got {delta!r}")
     if unit is Unit.DEGREES and delta > 180:
         raise InputError(f"delta: no two orientations are {delta!r} degrees apart; give one of at most 180")
+    if len(poses) < 2:
+        raise InputError(f"delta: {len(poses)} poses have no pair; give a trajectory of at least two")
     if all_pairs and unit is Unit.DEGREES:
         pairs = turned_pairs(poses[:, :3, :3], np.deg2rad(delta), np.deg2rad(delta) * tolerance)
     else:

@@ -38,8 +38,8 @@ class ReportedCovariance(Displayed):
 
     @property
     def is_overconfident(self) -> bool:
-        """Whether the mean NEES exceeds the bound of a single pose."""
-        return bool(np.mean(self.known) > overconfidence_bound())
+        """Whether the mean NEES exceeds the bound of a single pose; False where no pose has a NEES."""
+        return len(self.known) > 0 and bool(np.mean(self.known) > overconfidence_bound())
 
 
 def reported_covariance(reference: Entry, entry: Entry, matched: MatchedTrajectories) -> ReportedCovariance:

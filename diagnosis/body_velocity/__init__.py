@@ -1,1 +1,1 @@
-"""Estimation of faults and noise: the pipeline of a diagnosis and its result."""
+"""Faults and noise of body velocities: the pipeline of their diagnosis and its result."""

@@ -1,4 +1,4 @@
-"""The pipeline of a diagnosis: units, usability of observations, direction of the extrinsic, velocities."""
+"""The pipeline of a diagnosis of body velocities: units, observations, direction of the extrinsic, velocities."""
 
 from collections.abc import Mapping
 from dataclasses import replace

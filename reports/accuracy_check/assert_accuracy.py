@@ -5,6 +5,7 @@ import tempfile
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+import numpy as np
 import pandas as pd
 
 from fgbaseline.compare import (
@@ -27,8 +28,9 @@ from fgbaseline.geometry import FloatArray, InputError
 from ..comparison.sources import opened
 from ..phrases.check import bound, number
 
-AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | tuple[FloatArray, FloatArray]
-"""a trajectory, an estimate or the truth of a problem, a file (TUM, KITTI, EuRoC, npz), or stamps (n,) and poses"""
+AnyTrajectory: TypeAlias = Trajectory | Estimate | Truth | FilePath | FloatArray | tuple[FloatArray, FloatArray]
+"""a trajectory, an estimate or the truth of a problem, a file (`[NAME=]FILE`: TUM, KITTI, EuRoC, npz), poses (n, 4, 4)
+by frame, or stamps (n,) with poses or positions (n, 3)"""
 AT_LEAST = ("coverage", "pairs")
 """metrics with lower limits; all others have upper limits"""
 UNITS = {"coverage": "", "pairs": "", "rotation.rmse": " (°)"}
@@ -57,8 +59,8 @@ def assert_accuracy(
     Upper limits: `ate` and `ate_max`, RMSE and maximum of the position error (m) after alignment; `divergence` and
     `divergence_max`, without alignment; `rotation_deg`, RMSE of the rotation error (deg) after alignment. Lower limits:
     `coverage`, the share of the reference's time with paired poses, and `smallest_sample` pairs of poses. Poses are
-    associated by time within `tolerance` (s; see `compare.associate`), those of an Estimate or a Truth by frame. The
-    figure goes into the PNG file `figure`, by default in a new temporary folder, where a limit is violated.
+    associated by time within `tolerance` (s; see `compare.associate`), those of an Estimate, a Truth or an array by
+    frame. The figure goes into the PNG file `figure`, by default in a new temporary folder, where a limit is violated.
 
     Units and quaternion orders that a file does not state are detected as in `fgbaseline compare`, or given by
     `time_unit` and `quaternion`. Trajectories without orientations are compared by position only.
@@ -82,7 +84,7 @@ def assert_accuracy(
     _require_one_clock(estimate, reference)
     settings = Settings(tolerance=tolerance, time_unit=time_unit, quaternion=quaternion)
     given = {"reference": reference, "estimate": estimate}
-    sources = [opened(each, name=name if isinstance(each, tuple) else "") for name, each in given.items()]
+    sources = [opened(each, name=name if isinstance(each, tuple | np.ndarray) else "") for name, each in given.items()]
     resolved = resolve(sources, (), settings)
     there, here = (each.trajectory(()) for each in resolved)
     is_oriented = there.oriented and here.oriented
@@ -121,18 +123,24 @@ def _require_bounds(asked: dict[str, float | None]) -> None:
 
 def _require_one_clock(estimate: AnyTrajectory, reference: AnyTrajectory) -> None:
     """Raises InputError where only one of both has time stamps, or their frames are of different problems."""
-    by_frame = [isinstance(each, Estimate | Truth) for each in (estimate, reference)]
+    frames = [_frames(each) for each in (estimate, reference)]
+    by_frame = [n is not None for n in frames]
     if any(by_frame) and not all(by_frame):
         raise InputError(
-            "accuracy: an Estimate and a Truth are frames of a problem and have no time stamps; give the stamps with "
+            "accuracy: an Estimate, a Truth and an array are by frame and have no time stamps; give the stamps with "
             "the poses, such as (sequence.t, estimate.world_T_imu), or two of them"
         )
-    if isinstance(estimate, Estimate | Truth) and isinstance(reference, Estimate | Truth):
-        n, n_reference = len(estimate.world_T_imu), len(reference.world_T_imu)
-        if n != n_reference:
-            raise InputError(
-                f"accuracy: the estimate has {n} frames and the reference {n_reference}; give two of one problem"
-            )
+    if frames[0] != frames[1]:
+        raise InputError(
+            f"accuracy: the estimate has {frames[0]} frames and the reference {frames[1]}; give two of one problem"
+        )
+
+
+def _frames(given: AnyTrajectory) -> int | None:
+    """Number of frames of what has no time stamps; None of what has stamps, or is in a file."""
+    if isinstance(given, Estimate | Truth):
+        return len(given.world_T_imu)
+    return len(given) if isinstance(given, np.ndarray) else None
 
 
 def _require_orientations(resolved: list[Resolved], paths: list[Trajectory]) -> None:

@@ -168,8 +168,9 @@ def junit(checked: Checked) -> str:
 
     An untrusted reference has a case of its own: without one, a report without failures would be green.
     """
-    n_references = int(checked.undecided)
-    suites = ElementTree.Element("testsuites", {"name": "fgbaseline check", **_counts(checked.lines, n_references)})
+    suites = ElementTree.Element(
+        "testsuites", {"name": "fgbaseline check", **_counts(checked.lines, extra=checked.undecided)}
+    )
     for run in dict.fromkeys(line.run for line in checked.lines):
         lines = tuple(line for line in checked.lines if line.run == run)
         suite = ElementTree.SubElement(suites, "testsuite", {"name": run or "trajectories", **_counts(lines)})
@@ -178,12 +179,10 @@ def junit(checked: Checked) -> str:
         if checked.notices:
             ElementTree.SubElement(suite, "system-out").text = "\n".join(checked.notices)
     if checked.undecided:
-        suite = ElementTree.SubElement(suites, "testsuite", {"name": "reference", **_counts((), n_references)})
-        case, reasons = (
-            ElementTree.SubElement(suite, "testcase", classname="reference", name="trust"),
-            checked.references,
-        )
-        _problem(case, Outcome.UNDECIDED, " ".join(reasons), " ".join(reasons))
+        suite = ElementTree.SubElement(suites, "testsuite", {"name": "reference", **_counts((), extra=True)})
+        case = ElementTree.SubElement(suite, "testcase", classname="reference", name="trust")
+        reasons = " ".join(checked.references)
+        _problem(case, Outcome.UNDECIDED, reasons, reasons)
     ElementTree.indent(suites)
     document = NOT_XML.sub("?", ElementTree.tostring(suites, encoding="unicode"))
     return f"<?xml version='1.0' encoding='utf-8'?>\n{document}\n"
@@ -205,11 +204,11 @@ def _problem(case: ElementTree.Element, outcome: Outcome, message: str, text: st
     ElementTree.SubElement(case, tag, type=outcome.value, message=message).text = text
 
 
-def _counts(lines: tuple[Line, ...], n_references: int = 0) -> dict[str, str]:
-    """Attributes with the number of tests, of which `n_references` are on untrusted references."""
+def _counts(lines: tuple[Line, ...], *, extra: bool = False) -> dict[str, str]:
+    """Attributes with the number of tests; `extra` is the case of an untrusted reference, an error."""
     outcomes = [line.outcome for line in lines]
     return {
-        "tests": str(len(lines) + n_references),
+        "tests": str(len(lines) + extra),
         "failures": str(outcomes.count(Outcome.VIOLATED)),
-        "errors": str(outcomes.count(Outcome.UNDECIDED) + n_references),
+        "errors": str(outcomes.count(Outcome.UNDECIDED) + extra),
     }

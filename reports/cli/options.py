@@ -173,8 +173,8 @@ _RECORDING = (
 )
 
 
-def recorded(command: Command) -> Command:
-    """The options of recordings of images, and of motion given beside them."""
+def recording_inputs(command: Command) -> Command:
+    """Options that name what belongs to a recording: images, motion, extrinsic, inertial samples."""
     for option in reversed(_RECORDING):
         command = option(command)
     return command

@@ -60,7 +60,7 @@ from .options import PATH
     "'# up x y z', else 0,0,1 if the inertial samples agree within 0.5°, else the direction that they measure]",
 )
 @options.as_recorded
-@options.recorded
+@options.recording_inputs
 @options.time_unit
 @options.repairs
 @options.held_out
@@ -116,7 +116,7 @@ def run(
 @click.argument("source", metavar="INPUT", type=PATH)
 @click.option("--out", type=PATH, required=True, help="Npz to write.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
-@options.recorded
+@options.recording_inputs
 def track(source: Path, out: Path, force: bool, tracker: Path | None, **given: Any) -> int:
     """Track the images in INPUT and write their tracks.
 
@@ -156,7 +156,7 @@ def estimators() -> None:
 @click.option("--out", type=PATH, help="Folder for diagnosis.json, figures and page.")
 @click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json alone on standard output.")
 @click.option("--write-repairs", type=PATH, help="TOML file of the repairs, to edit and to use with run --repairs.")
-@options.recorded
+@options.recording_inputs
 @options.time_unit
 @click.option("--force", is_flag=True, help="Replace the folder, or the repairs, of an earlier diagnosis.")
 @options.open_page
@@ -194,7 +194,7 @@ def diagnose(
 @click.option("--force", is_flag=True, help="Replace the folder of an earlier export.")
 @options.preset
 @options.features
-@options.recorded
+@options.recording_inputs
 @options.as_recorded
 @options.repairs
 @options.held_out

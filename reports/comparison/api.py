@@ -95,7 +95,8 @@ def compare_trajectories(
 
     Raises InputError, in one sentence, for an invalid trajectory or keyword. No argument is changed.
     """
-    options = {name: value for name, value in locals().items() if name not in ("reference", "estimates")}
+    options = dict(locals())  # before any other name is bound
+    del options["reference"], options["estimates"]
     from .sources import ARRAYS, by_name, opened
 
     every = [opened(each, form, name) for name, each in by_name(estimates)]

@@ -11,7 +11,7 @@ from fgbaseline.data.wording import plural
 from ..formatting import interval, listed, number
 from ..results.bench import ANSWERED, BENCH_METRICS, Results, consistency, judge, overall, rankings, records
 from ..results.metric_record import Metric
-from .evidence import MEANING
+from .evidence import MEANING, WITHIN
 
 MOST_CASES = 10
 """number of cases up to which each has a sentence"""
@@ -96,10 +96,12 @@ def winner(case: str, ranked: pd.DataFrame, metric: Metric, unranked: frozenset[
     if most == 1:
         each = listed(f"{figures[row['estimator']]} for {row['estimator']}" for row in (first, *others))
         return f"{case}: {metric.short} {each}; one run does not rank them{left_out}."
-    tied = [row["estimator"] for row in others if row["tied"]]
+    tied = [row["estimator"] for row in others if row["tied"] and not row["behind_low"] > 0.0]
+    level = [row["estimator"] for row in others if row["tied"] and row["behind_low"] > 0.0]
     apart = [f"{row['estimator']} {figures[row['estimator']]}" for row in others if not row["tied"]]
-    title = f"{case}: {'' if tied else 'smallest '}{metric.short}"
+    title = f"{case}: {'' if tied or level else 'smallest '}{metric.short}"
     like = f"; no significant difference from {listed(tied)}" if tied else ""
+    like += f"; the same within {WITHIN} as {listed(level)}" if level else ""
     larger = f"; larger, by the paired interval: {listed(apart)}" if apart else ""
     return f"{title} {first['estimator']} {figures[first['estimator']]} over {most} runs{like}{larger}{left_out}."
 

@@ -43,6 +43,8 @@ MEANING: Mapping[str, str] = {
     "untrusted": "Divergence from it does not measure accuracy",
 }
 """consequence of a verdict other than `trusted`"""
+WITHIN = limit_per_cent(MIN_DIFFERENCE)
+"""difference up to which two errors are the same, as text"""
 
 
 def reference_sentence(name: str, trust: "Trust", *, is_compared: bool = True) -> str:
@@ -114,7 +116,7 @@ def reference_sigma_sentence(name: str, sigma: Mapping[str, float | None]) -> st
 
 
 def held_out_sentences(ranking: "pd.DataFrame", sample: str) -> list[str]:
-    """Median held-out errors in a sentence, and the paths without a significant difference from the first in another.
+    """Median held-out errors, paths without a significant difference from the first, and those with one within 1 %.
 
     `ranking` has a row for each path, best first, with `median` and `behind_low`; `sample` names what it is taken over.
     """
@@ -122,8 +124,13 @@ def held_out_sentences(ranking: "pd.DataFrame", sample: str) -> list[str]:
     best, *others = medians
     each = listed(f"{median} px for {name}" for name, median in medians.items())
     least = ranking["median"].iloc[0]
-    tied = [n for n in others if not ranking["behind_low"][n] > 0.0 or is_level(ranking["median"][n], least)]
-    return [f"Held-out error (median over {sample}): {each}.", *no_difference(best, tied, "held-out error")]
+    tied = [name for name in others if not ranking["behind_low"][name] > 0.0]
+    level = [name for name in others if name not in tied and is_level(ranking["median"][name], least)]
+    return [
+        f"Held-out error (median over {sample}): {each}.",
+        *no_difference(best, tied, "held-out error"),
+        *([f"The held-out error of {listed([best, *level])} is the same within {WITHIN}."] if level else []),
+    ]
 
 
 def no_difference(first: str, others: Iterable[str], quantity: str, over: str = "") -> list[str]:
@@ -181,21 +188,21 @@ def _order(comparison: Comparison) -> list[str]:
 
 
 def significance_sentences(rmse: Mapping[str, float], behind: Mapping[str, RmseDifference]) -> list[str]:
-    """Paired differences from the smallest RMSE: the claimed ones, those within `MIN_DIFFERENCE`, and the others.
+    """Paired differences from the smallest RMSE: claimed ones, significant ones within `MIN_DIFFERENCE`, others.
 
     `rmse` is by name, smallest first.
     """
     first = next(iter(rmse))
     larger, level, other = (
         f"Larger position RMSE than {first}, by paired bootstrap",
-        f"Same position RMSE as {first} within {limit_per_cent(MIN_DIFFERENCE)}",
+        f"Same position RMSE as {first} within {WITHIN}",
         f"No significant difference from {first}, by paired bootstrap",
     )
 
     def title(name: str) -> str:
         if is_claimed(behind[name], rmse[name], rmse[first]):
             return larger
-        return level if is_level(rmse[name], rmse[first]) else other
+        return level if behind[name].settled else other
 
     groups = grouped(
         (title(name), f"{name} ({_signed(d.value)} m [{_signed(d.low)}, {_signed(d.high)}])")

@@ -19,7 +19,7 @@ from fgbaseline.compare import (
     is_level,
     paired_ranking,
 )
-from fgbaseline.compare.divergence_onset import path_length
+from fgbaseline.compare.divergence_onset import reference_path_length
 from fgbaseline.compare.estimate_comparison import Result, Run
 from fgbaseline.compare.overconfidence import (
     Overconfidence,
@@ -134,7 +134,8 @@ def _ranked(run: Run, rivals: dict[str, Result], found: PairedRanking) -> list[s
     def each(names: Iterable[str]) -> str:
         return listed(f"{name} {distance(found.rmse[name])}{_share(found.rmse[name], rivals[name])}" for name in names)
 
-    over = f"RMSE over a path length of {number(path_length(rivals[first]))} m{_over(run, found)}{_unranked(run)}"
+    length = number(reference_path_length(rivals[first]))
+    over = f"RMSE over a path length of {length} m{_over(run, found)}{_unranked(run)}"
     larger = [name for name in others if is_claimed(found.behind[name], found.rmse[name], found.rmse[first])]
     level = [name for name in others if name not in larger]
     equal = [name for name in level if is_level(found.rmse[name], found.rmse[first])]
@@ -167,7 +168,7 @@ def _closeness(run: Run, found: PairedRanking) -> list[str]:
 
 
 def _share(rmse: float, result: Result) -> str:
-    length = path_length(result)
+    length = reference_path_length(result)
     return f" ({per_cent(rmse / length)} of the path length)" if length > 0 else ""
 
 

@@ -244,10 +244,8 @@ def simulated_stages(simulated: StandIn) -> list[Stage]:
     if simulated.gyro_bias.any():
         stages.append(_bias_removed(stages[-1], simulated.gyro_bias, simulated.angular_axes))
     if simulated.wrong.any():
-        now, cause = (
-            stages[-1].sequence,
-            f"wrong matches ({per_cent(float(simulated.wrong.mean()))} of the observations)",
-        )
+        now = stages[-1].sequence
+        cause = f"wrong matches ({per_cent(float(simulated.wrong.mean()))} of the observations)"
         right = replace(now, observations=now.observations.select(~simulated.wrong))
         stages.append(Stage("right matches", cause, right))
     return stages

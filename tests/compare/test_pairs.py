@@ -111,6 +111,14 @@ def test_deltas_that_make_no_pairs_are_errors(delta: float, unit: str, sentence:
         compare.pose_pairs(straight(np.ones(19)), np.arange(20.0), delta, unit, all_pairs=all_pairs)
 
 
+@pytest.mark.parametrize("n", [0, 1])
+@pytest.mark.parametrize("unit", [*Unit])
+@pytest.mark.parametrize("all_pairs", [False, True])
+def test_fewer_than_two_poses_make_no_pairs(n: int, unit: Unit, all_pairs: bool) -> None:
+    with pytest.raises(InputError, match=f"delta: {n} poses have no pair"):
+        compare.pose_pairs(straight(np.ones(1))[:n], np.arange(float(n)), 1.0, unit, all_pairs=all_pairs)
+
+
 def test_errors_of_motions_are_in_the_body_and_of_poses_in_the_world() -> None:
     """A step of 2 m instead of 1 m after a wrong turn of 90 degrees: worked out by hand."""
     reference = straight(np.ones(2))

@@ -64,6 +64,9 @@ def test_every_kind_of_trajectory_is_taken(tmp_path: Path) -> None:
     answer = Estimate("mine", estimated(), np.zeros(0, dtype=np.bool_))
     by_frame = assert_accuracy(answer, Truth(true_path()), ate=1.0)
     assert by_frame["ate.rmse"] == pytest.approx(first["ate.rmse"])
+    assert assert_accuracy(estimated(), Truth(true_path()), ate=1.0) == pytest.approx(by_frame)
+    positions = assert_accuracy((STAMPS, estimated()[:, :3, 3]), truth, ate=1.0)
+    assert positions["ate.rmse"] == pytest.approx(first["ate.rmse"])
 
 
 def test_the_message_shows_the_table_and_where_the_figure_is(tmp_path: Path) -> None:
@@ -130,6 +133,10 @@ def test_assert_accuracy_refuses_missing_limits_and_unmatched_trajectories() -> 
         assert_accuracy(Truth(true_path()), truth, ate=1.0)
     with pytest.raises(InputError, match="100 frames and the reference 200"):
         assert_accuracy(Truth(true_path()[:100]), Truth(true_path()), ate=1.0)
+    with pytest.raises(InputError, match="58 frames and the reference 60"):
+        assert_accuracy(true_path()[:58], true_path()[:60], ate=1.0)
+    with pytest.raises(AssertionError, match="estimate does not meet its limits, against reference:"):
+        assert_accuracy(estimated(), true_path(), ate=0.01)
     with pytest.raises(InputError, match=r"within 0\.01 s"):
         assert_accuracy((STAMPS + 1e5, true_path()), truth, ate=1.0)
 

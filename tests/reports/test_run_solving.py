@@ -11,7 +11,7 @@ import pytest
 from fgbaseline import ekf
 from fgbaseline.compare.estimate_comparison import compare_all
 from fgbaseline.data import Estimate, Innovations, Landmarks, Problem, Progress, Status
-from fgbaseline.data.estimators import runner as estimator_runner
+from fgbaseline.data.estimators import runner
 from fgbaseline.data.estimators.runner import solve_all
 from fgbaseline.geometry import InputError
 from fgbaseline.reports.problem.construction import read_sequence
@@ -28,7 +28,7 @@ PROBLEM = plain_problem(Scene().sequence())
 def installed(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """What `find_estimator` finds, beside dead reckoning."""
     estimators: dict[str, Any] = {"dead-reckoning": ekf.dead_reckoning}
-    monkeypatch.setattr(estimator_runner, "find_estimator", estimators.__getitem__)
+    monkeypatch.setattr(runner, "find_estimator", estimators.__getitem__)
     return estimators
 
 

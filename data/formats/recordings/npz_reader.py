@@ -7,7 +7,7 @@
 | `angular_velocity` | (3, T) rad/s | later, own, unless there are raw inertial samples |
 | `rotational_velocity` | (3, T) rad/s | 2020 |
 | `features` | (4, N, T) px, -1 unobserved; may be absent, or a list (`observation_list`) | all |
-| `K`, `b` | (3, 3) px, scalar m; `b` may be absent with observations of one camera (`one_camera`) | all |
+| `K`, `b` | (3, 3) px, scalar m; `b` may be absent with observations of one camera (`monocular_observations`) | all |
 | `imu_T_cam` | (4, 4) | later, own |
 | `cam_T_imu` | (4, 4): rotation IMU to camera, translation the camera's position in the IMU frame | 2020 |
 | `ground_truth` | (T, 4, 4) world_T_imu, a frame all NaN where unknown; may be absent | own |
