@@ -27,7 +27,7 @@ import click
 
 from benchmarks.claim_table import Row, table
 from fgbaseline.reports.cli import NEW_OBJECTS
-from fgbaseline.reports.problem.defaults import DEFAULT_ESTIMATORS
+from fgbaseline.reports.problem import DEFAULT_ESTIMATORS
 
 WANTED = 8.0
 """s, of all that is not an estimator"""

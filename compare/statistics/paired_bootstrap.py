@@ -98,7 +98,7 @@ class PairedRanking:
     errors: Mapping[str, FloatArray] = field(repr=False, compare=False)
     """(moments,) by name, in that order"""
     seed: int
-    """of the bootstrap"""
+    """seed of the bootstrap"""
 
     def difference(self, name: str, other: str) -> RmseDifference:
         """RMSE of one minus that of another, over the stamps at which all of them have an error."""

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from ..problem.defaults import names_in
+from ..problem import names_in
 
 PATH = click.Path(path_type=Path)
 UNITS = click.Choice(["s", "ms", "us", "ns"])

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from ..problem.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
+from ..problem import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
 from . import options
 from .options import PATH
 

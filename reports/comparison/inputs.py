@@ -25,7 +25,7 @@ from fgbaseline.data.formats.trajectories.format_detection import OpenedTrajecto
 from fgbaseline.data.formats.trajectories.kitti import read_extrinsic
 from fgbaseline.geometry import FloatArray, InputError, se3
 
-from ..problem.defaults import names_in
+from ..problem import names_in
 from .sources import TrajectoryLike, opened
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from fgbaseline.data.problem.documented import DEFAULT_FEATURES
 from fgbaseline.data.tracking import Cameras
 from fgbaseline.geometry import InputError
 
-from .defaults import DEFAULT_ESTIMATORS, ONE_CAMERA_ESTIMATORS, names_in
+from . import DEFAULT_ESTIMATORS, ONE_CAMERA_ESTIMATORS, names_in
 
 BESIDE = ("velocities", "extrinsic")
 IMAGES = ("cameras", "right", "calibration", "times", "tracker")

@@ -25,8 +25,8 @@ from fgbaseline.data.formats.files.file_errors import FilePath, as_path
 
 from ..comparison.sources import Array, TrajectoryLike, by_name, opened
 from ..phrases.run import verdict
+from ..problem import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
 from ..problem.construction import build_problem, hold_out_tracks, read_sequence
-from ..problem.defaults import BATCH_OBSERVATIONS, DEFAULT_ESTIMATORS, names_in
 from ..problem.settings import RunSettings, Solver, check_estimators, import_estimators, named_estimators, with_defaults
 from ..python_interface import NotebookResult, for_python, write_report
 from ..results.json_files import SUMMARY

@@ -23,7 +23,7 @@ from fgbaseline.data.problem_export import write_problem
 from fgbaseline.geometry import InputError, se3
 from fgbaseline.reports.cli import COMMANDS
 from fgbaseline.reports.comparison import ComparisonReport
-from fgbaseline.reports.problem.defaults import DEFAULT_ESTIMATORS
+from fgbaseline.reports.problem import DEFAULT_ESTIMATORS
 from fgbaseline.reports.problem.settings import named_estimators
 from fgbaseline.reports.python_interface import in_python
 from fgbaseline.reports.run.api import RunReport

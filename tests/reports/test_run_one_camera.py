@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fgbaseline.data import read
-from fgbaseline.reports.problem.defaults import ONE_CAMERA_ESTIMATORS
+from fgbaseline.reports.problem import ONE_CAMERA_ESTIMATORS
 
 from ..builders.commands import fgbaseline
 from ..builders.rendered import SwayingRoom
