@@ -64,6 +64,30 @@ def test_a_correction_takes_unobservable_directions_to_themselves() -> None:
     np.testing.assert_allclose(state.P, N @ N.T, atol=1e-9 * np.abs(N @ N.T).max())
 
 
+def test_the_error_of_an_anchor_is_that_of_the_camera_by_which_it_was_set() -> None:
+    problem = simulated_problem("drone", 3, seconds=2.0, cameras="left")
+    lever = problem.sequence.imu_T_cam[:3, 3]
+    assert np.linalg.norm(lever) > 0.01
+    run = JointFilter(problem, JointSettings.of(problem))
+    for k, seen in enumerate(problem.observations().by_frame(problem.n_frames)):
+        run.process_frame(k, seen)
+        if k > 0 and run.state.slot_of[run.state.n_features + k] >= 0:  # landmarks began in this frame
+            break
+    state, slot = run.state, int(run.state.slot_of[run.state.n_features + k])
+    assert slot >= 0
+
+    def camera(delta: FloatArray) -> FloatArray:
+        return np.asarray((state.pose @ se3.exp(delta))[:3, :3] @ lever + (state.pose @ se3.exp(delta))[:3, 3])
+
+    step = 1e-6 * np.eye(6)
+    J = np.stack([(camera(d) - camera(-d)) / 2e-6 for d in step], axis=1)
+    own = slice(state.n_body + 3 * slot, state.n_body + 3 * slot + 3)
+    np.testing.assert_allclose(state.xi[slot], camera(np.zeros(6)))
+    scale = np.sqrt(np.diagonal(state.P))
+    np.testing.assert_allclose(state.P[own, :6], J @ state.P[:6, :6], atol=1e-6 * scale[:6].max() * scale[own].max())
+    np.testing.assert_allclose(state.P[own, own], J @ state.P[:6, :6] @ J.T, atol=1e-6 * scale[own].max() ** 2)
+
+
 def test_a_rejected_update_leaves_the_prior() -> None:
     problem = simulated_problem("drone", 3, seconds=2.0, cameras="left")
     run = run_until(problem, 1)
