@@ -12,6 +12,7 @@ from fgbaseline.geometry import se3
 from fgbaseline.reports import comparison
 from fgbaseline.reports.accuracy_check.evaluation import evaluate
 from fgbaseline.reports.accuracy_check.limits import read_limits
+from fgbaseline.reports.formatting import number
 from fgbaseline.reports.html.plot_data import page_data
 from fgbaseline.reports.phrases.run import verdict
 from fgbaseline.reports.phrases.run_accuracy import ate_sentences
@@ -199,6 +200,17 @@ def test_an_ate_below_the_decimals_of_the_ground_truth_is_zero_and_not_ranked(di
         assert cells["ekf"].text.startswith("< ") == cells["isam2"].text.startswith("< ") == zero
         assert not (zero and cells["ekf"].best)
         assert not cells["joint-ekf"].text.startswith("< ")
+
+
+def test_without_ground_truth_overconfidence_is_against_the_reference() -> None:
+    problem = plain_problem(scene())
+    problem = replace(problem, sequence=replace(problem.sequence, truth=None))
+    T = problem.n_frames
+    bold = answer(problem, "ekf", (3.0, 0.0, 0.0), covariance=claiming(1e-3, T))
+    run = run_of(problem, bold, answer(problem, "isam2", covariance=claiming(1e-4, T)))
+    (said,) = (s for s in verdict(run) if s.startswith("Overconfident: "))
+    rmse = run.results["ekf"].divergence_rmse
+    assert f"ekf claims a position sigma of 0.00173 m (RMS) but differs from isam2 by {number(rmse)} m (RMSE" in said
 
 
 def test_a_claim_above_the_error_is_not_called_overconfident() -> None:

@@ -355,6 +355,7 @@ BAD: dict[str, Bad] = {
     "up": (("truth.tum", "near.csv"), {"up": (0.0, 0.0, 0.0)}, "up: expected a direction"),
     "delta": (("truth.tum", "near.csv"), {"deltas": ["10"]}, "delta: expected a length above 0 with its unit.*'10'"),
     "zero delta": (("truth.tum", "near.csv"), {"deltas": ["0m"]}, "delta: expected a length above 0.*'0m'"),
+    "endless delta": (("truth.tum", "near.csv"), {"deltas": ["1e999m"]}, "delta: expected a length above 0.*'1e999m'"),
     "insisted": (
         ("truth.tum", "near.csv"),
         {"form": "kitti"},

@@ -57,6 +57,7 @@ def test_the_divergence_onset_is_the_first_frame_beyond_the_threshold() -> None:
     assert limit < 5.0
     assert table["position"][left.frame] > limit
     assert (table["position"][: left.frame] <= limit).all()
+    assert left.seconds == run.problem.sequence.t[left.frame] - run.problem.sequence.t[0]
     sentence = sentence_of(run, "Maximum divergence: ")
     assert f"; threshold 1 % of the path length, {limit:.3g} m. Above the threshold: " in sentence
     assert f"ekf from {left.seconds:.1f} s (frame {left.frame}) on" in sentence

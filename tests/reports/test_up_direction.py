@@ -109,3 +109,8 @@ def test_files_that_contradict_each_other_on_up_are_named(tmp_path: Path) -> Non
 def _path() -> tuple[FloatArray, FloatArray]:
     step = se3.exp([0.5, 0.0, 0.05, 0.01, 0.02, 0.03])
     return 0.1 * np.arange(60), se3.compose(np.tile(step, (59, 1, 1)))
+
+
+def test_a_given_up_is_a_direction_of_any_length(folder: Path) -> None:
+    paths = [folder / "trajectories" / f"{name}.tum" for name in ("isam2", "ekf")]
+    np.testing.assert_allclose(compare(*paths, align="none", up=(0.0, 3.0, 4.0)).up, [0.0, 0.6, 0.8])
