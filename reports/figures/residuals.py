@@ -251,7 +251,9 @@ def map_difference(data: RunData | ComparisonData, style: Style = SCREEN) -> Fig
     In meters and sigmas, on paper only in the camera frame. Another solver of the reference's graph has no distance in
     sigmas: P - P_ref is zero up to rounding.
     """
-    from fgbaseline.compare.estimate_comparison import SAME_GRAPH
+    if not data.by_depth:
+        return None
+    from fgbaseline.compare.estimate_comparison import SAME_GRAPH  # pandas and scipy, which files alone do without
 
     tables = {
         name: table.assign(sigmas=np.nan) if {name, data.reference} <= set(SAME_GRAPH) else table

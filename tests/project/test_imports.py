@@ -21,9 +21,8 @@ LAZY = (
 )
 LOADED = f"import sys; print(*(name for name in {HEAVY!r} if name in sys.modules), file=sys.stderr)"
 COMMAND = f"""
-import atexit, os
-own = os.getpid()  # forks end without atexit, but not where coverage is measured
-atexit.register(lambda: os.getpid() == own and exec({LOADED!r}, {{}}))
+import atexit
+atexit.register(lambda: exec({LOADED!r}, {{}}))
 from fgbaseline.reports.cli import main
 main()
 """
