@@ -390,3 +390,13 @@ def test_an_order_of_quaternions_that_a_straight_path_does_not_show_is_in_doubt(
     assert not any(said in sentence for sentence in settled.verdict)
     unsettled = compare(*files)
     assert any(said in sentence for sentence in unsettled.verdict) or figures(unsettled) == figures(settled)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_matrices_with_stamps_are_not_those_of_a_kitti_camera(tmp_path: Path, seed: int) -> None:
+    """Whatever the motion: a reference in a file without a convention has its up assumed."""
+    truth = flight(seed, rate=20, start=0)
+    (tmp_path / "stamped.csv").write_bytes(VARIANTS["stamps before matrices"].write(truth))
+    (tmp_path / "estimate.tum").write_text(tum(astray(truth, seed)))
+    found = compare(tmp_path / "stamped.csv", tmp_path / "estimate.tum")
+    assert (found.up.tolist(), found.up_from) == ([0.0, 0.0, 1.0], "assumed")

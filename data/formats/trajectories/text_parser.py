@@ -50,8 +50,9 @@ def parse_text(text: TrajectoryText) -> ParsedTrajectory:
     if columns.matrix:
         poses = poses_of_matrices(pose[:, :12], line)
         position, rotation = poses[:, :3, 3], poses[:, :3, :3]
-        up = _up_of_camera(position, rotation) if file.up is None else file.up
-        return replace(file, position=position, rotation=rotation, up=up)
+        if file.up is None and file.stamps is None:  # KITTI's files have no stamps; others state no camera
+            file = replace(file, up=_up_of_camera(position, rotation))
+        return replace(file, position=position, rotation=rotation)
     if columns.length in METERS:
         pose = _in_meters(pose, METERS[columns.length], columns)
         file = replace(file, remarks=(*file.remarks, f"its positions are in {columns.length} and are given in m"))
