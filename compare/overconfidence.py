@@ -8,7 +8,7 @@ import numpy as np
 
 from fgbaseline.geometry import FloatArray
 
-from .statistics.descriptive import summarized
+from .statistics.descriptive import summarized, without_nan
 
 if TYPE_CHECKING:
     from .estimate_comparison import Result, Run
@@ -96,5 +96,5 @@ def _overconfidence(run: "Run", result: "Result") -> Overconfidence | None:
 
 
 def _median(values: FloatArray) -> float:
-    known = values[~np.isnan(values)]
+    known = without_nan(values)
     return float(np.median(known)) if len(known) else float("nan")

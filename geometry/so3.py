@@ -163,8 +163,8 @@ def orthogonality_error(matrix: ArrayLike) -> FloatArray:
     return result
 
 
-def nearest_rotations(matrices: FloatArray) -> FloatArray:
-    """The rotations (n, 3, 3) nearest to matrices (n, 3, 3) of positive determinant, in the Frobenius norm (SVD)."""
-    U, _, Vt = np.linalg.svd(matrices)
-    result: FloatArray = U @ Vt
-    return result
+def nearest_rotations(matrices: ArrayLike) -> FloatArray:
+    """The rotations (..., 3, 3) nearest to matrices (..., 3, 3) in the Frobenius norm (SVD)."""
+    U, _, Vt = np.linalg.svd(np.asarray(matrices, dtype=np.float64))
+    U[..., 2] *= np.sign(np.linalg.det(U @ Vt))[..., None]
+    return np.asarray(U @ Vt)

@@ -12,6 +12,7 @@ from fgbaseline.data import Estimate, Truth
 from fgbaseline.geometry import FloatArray, se3
 
 from ..statistics.chi_square import mahalanobis_squared, share_inside_bounds
+from ..statistics.descriptive import without_nan
 from .covariance import CovarianceState, covariance_state
 
 PARTS = {"position": slice(0, 3), "rotation": slice(3, 6)}
@@ -58,7 +59,7 @@ def nees_summary(values: FloatArray, degrees: float = 6.0) -> dict[str, float | 
 
     The statistics are NaN where every frame is. `degrees`: expected mean, the degrees of freedom of the error.
     """
-    known = values[~np.isnan(values)]
+    known = without_nan(values)
     return {
         "mean": float(np.mean(known)) if len(known) else np.nan,
         "median": float(np.median(known)) if len(known) else np.nan,

@@ -70,7 +70,7 @@ def world_rotation_from_orientations(reference: FloatArray, estimate: FloatArray
     """Rotation of the worlds `reference_R_estimate` (3, 3) from the relative rotations of (n, 3, 3) over STEP poses."""
     k = min(STEP, len(reference) - 1)
     turned = [so3.log_so3(R[k:] @ np.swapaxes(R[:-k], 1, 2)) for R in (reference, estimate)]
-    return _nearest(turned[0].T @ turned[1])
+    return so3.nearest_rotations(turned[0].T @ turned[1])
 
 
 def rotation_misfit(reference: FloatArray, estimate: FloatArray, world: FloatArray) -> float:
@@ -176,13 +176,7 @@ def _hand_eye(reference: FloatArray, estimate: FloatArray, world: FloatArray) ->
     moments = (estimate.reshape(n, 9).T @ reference.reshape(n, 9)).reshape(3, 3, 3, 3)  # all sums over the poses
     W, B = world, np.eye(3)
     for _ in range(ITERATIONS):
-        B = _nearest(np.einsum("jikl,kj->il", moments, W))
-        W = _nearest(np.einsum("lkij,kj->il", moments, B))
+        B = so3.nearest_rotations(np.einsum("jikl,kj->il", moments, W))
+        W = so3.nearest_rotations(np.einsum("lkij,kj->il", moments, B))
     left = np.swapaxes(reference, 1, 2) @ (W @ estimate @ B)
     return BodyRotation(B, float(np.rad2deg(np.median(so3.rotation_angle(left)))))
-
-
-def _nearest(matrix: FloatArray) -> FloatArray:
-    """Rotation (3, 3) nearest to a matrix (3, 3) in the Frobenius norm."""
-    U, _, Vt = np.linalg.svd(matrix)
-    return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)

@@ -7,6 +7,7 @@ import numpy as np
 from fgbaseline import compare
 from fgbaseline.compare import Align, Association, CovarianceState, MatchedTrajectories
 from fgbaseline.compare.overconfidence import overconfidence_bound
+from fgbaseline.compare.statistics.descriptive import without_nan
 from fgbaseline.compare.trajectory_comparison.inputs import Entry
 from fgbaseline.data import Estimate, Truth
 from fgbaseline.data.display import Displayed
@@ -34,7 +35,7 @@ class ReportedCovariance(Displayed):
     @property
     def known(self) -> FloatArray:
         """NEES (m,) of the poses that have one."""
-        return np.asarray(self.nees[~np.isnan(self.nees)])
+        return without_nan(self.nees)
 
     @property
     def is_overconfident(self) -> bool:

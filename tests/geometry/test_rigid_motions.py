@@ -168,3 +168,17 @@ def test_a_batch_is_its_members(batch: list[FloatArray]) -> None:
     ):
         one_by_one = np.array([function(xi) for xi in stacked])
         np.testing.assert_allclose(function(stacked), one_by_one, rtol=1e-13, atol=1e-13)
+
+
+@given(st.integers(0, 2**20))
+def test_no_rotation_is_nearer_to_a_matrix_than_the_nearest_one(seed: int) -> None:
+    """For matrices of positive and of negative determinant, against rotations around it and anywhere."""
+    random = np.random.default_rng(seed)
+    matrices = random.normal(size=(2, 3, 3))
+    nearest = so3.nearest_rotations(matrices)
+    assert so3.orthogonality_error(nearest).max() < 1e-12
+    for matrix, R in zip(matrices, nearest, strict=True):
+        turns = np.concatenate([1e-3 * random.normal(size=(50, 3)), 3.0 * random.normal(size=(50, 3))])
+        others = R @ so3.exp_so3(turns)
+        assert np.linalg.norm(others - matrix, axis=(1, 2)).min() >= np.linalg.norm(R - matrix) - 1e-12
+        np.testing.assert_allclose(so3.nearest_rotations(matrix), R)
